@@ -127,15 +127,14 @@ def plain(
 
 
 def extras(problem: Problem) -> str:
-    """Exponents along with ten revolutions, and monodromy matrices, beside plain revolutions of the same lanes."""
+    """Exponents along with ten revolutions beside plain revolutions of the same lanes."""
     turns, starts = 10, problem.states[:, None]
     settings: dict[str, Any] = dict(starts=starts, discard=0, revolutions=turns, blocks=1, keep=1)
-    swept = lambda k: jc.sweep(problem.model, problem.speeds, exponents=k, **settings).last
+    swept = lambda k: jc.sweep(problem.model, problem.speeds, exponents=k, **settings)["last"]
     runs = {
         "plain revolution": (turns, lambda: swept(0)),
         "with one exponent": (turns, lambda: swept(1)),
         "with four exponents": (turns, lambda: swept(4)),
-        "monodromy matrix": (1, lambda: jc.lanes.monodromy(problem.model, problem.speeds, problem.states)),
     }
     first = {name: seconds(run) for name, (_, run) in runs.items()}
     spent = [{name: seconds(run) for name, (_, run) in runs.items()} for _ in range(REPEATS)]
@@ -152,7 +151,7 @@ def extras(problem: Problem) -> str:
     ]
     head = ["", "us", "in plain revolutions", "compile, s"]
     text = f"jaxcage, default method, {problem.speeds.size} lanes."
-    return f"## Exponents and monodromy matrices\n\n{text}\n\n{markdown(head, rows)}\n"
+    return f"## Exponents\n\n{text}\n\n{markdown(head, rows)}\n"
 
 
 def scaling(file: str, cores: int, quick: bool) -> str:

@@ -10,13 +10,13 @@ import json
 import pathlib
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
+import xarray as xr
 
 import jaxcage as jc
 from benchmarks.common import commit
 from jaxcage.files import configuration
-from jaxcage.models import BearingState, Bodies, Rollers, state_scale
+from jaxcage.models import Bodies, Rollers, state_scale
 
 
 FILE = pathlib.Path(__file__).with_suffix(".json")
@@ -35,7 +35,7 @@ MEANS = (
     "land_power_W",
     "eccentricity_mean",
     "whirl_ratio",
-    "exponent",
+    "exponents",
 )
 
 
@@ -59,7 +59,7 @@ def state_of(rollers: np.ndarray, bodies: np.ndarray, angle: float, time: float)
     }
 
 
-def arcs(model: jc.BearingModel, rpm: float, start: BearingState) -> dict[str, Any]:
+def arcs(model: jc.BearingModel, rpm: float, start: tuple[float, ...]) -> dict[str, Any]:
     """States at the ends of neighbouring arcs from a settled motion, and how sure they are."""
     run = jc.simulate(
         model, jc.rpm(rpm), revolutions=1, samples=SAMPLES, start=start, method=jc.native(TOLERANCE, 1e-3)
@@ -80,22 +80,22 @@ def arcs(model: jc.BearingModel, rpm: float, start: BearingState) -> dict[str, A
     }
 
 
-def statistics(found: jc.BearingSweep, load: float) -> list[dict[str, Any]]:
+def statistics(found: xr.Dataset, load: float) -> list[dict[str, Any]]:
     """Means with standard errors at every speed, from all starts."""
     rows = []
-    for i, rpm in enumerate(found.rpm):
+    for i, rpm in enumerate(found["rpm"].values):
         row: dict[str, Any] = {"shaft_speed_rpm": round(float(rpm), 6), "load_N": load}
         for name in MEANS:
-            blocks = found.block_means[name][i]
+            blocks = found["block_growth" if name == "exponents" else f"{name}_blocks"].values[i]
             error = np.std(blocks, ddof=1) / np.sqrt(blocks.size)
             if not error > 0:  # a tangent vector that is no number any more grows by nothing: not known
                 row[name] = None
                 continue
             row[name] = {"mean": float(f"{blocks.mean():.5g}"), "standard_error": float(f"{error:.2g}")}
         row |= {
-            "pocket_force_max_N": float(f"{np.max(found.pocket_force_max_N[i]):.4g}"),
-            "state": [str(x) for x in found.state[i]],
-            "outcome": [str(x) for x in found.outcome[i]],
+            "pocket_force_max_N": float(f"{float(found['pocket_force_max_N'][i].max()):.4g}"),
+            "state": found["label"].values[i].tolist(),
+            "outcome": found["outcome"].values[i].tolist(),
         }
         rows.append(row)
     return rows
@@ -106,15 +106,14 @@ def made(discard: int, revolutions: int) -> dict[str, Any]:
     model = jc.whole_bearing("nu2310")
     models = [jc.replace(model, load=load) for load in LOADS]
     length: dict[str, Any] = dict(starts=STARTS, discard=discard, revolutions=revolutions, blocks=BLOCKS)
-    sweeps = jc.sweep_bearings(models, np.array([jc.rpm(rpm) for rpm in SPEEDS]), **length)
+    swept = jc.sweep(models, np.array([jc.rpm(rpm) for rpm in SPEEDS]), **length)
+    sweeps = [swept.isel(design=i) for i in range(len(models))]
     trajectories = []
     for load in ARC_LOADS:
         found = sweeps[LOADS.index(load)]
         for rpm in ARC_SPEEDS:
             i = SPEEDS.index(rpm)
-            clock = np.array([found.last_angle[i, 0], 0.0])
-            start = BearingState(*map(jnp.asarray, (found.last_rollers[i, 0], found.last_bodies[i, 0], clock)))
-            trajectories.append(arcs(models[LOADS.index(load)], rpm, start))
+            trajectories.append(arcs(models[LOADS.index(load)], rpm, tuple(found["last"].values[i, 0].tolist())))
     return {
         "what": "NU2310, whole bearing: open benchmark case; docs/whole-bearing.md says how to compare with it",
         "made_by": f"python -m benchmarks.bearing_case --discard {discard} --revolutions {revolutions}",

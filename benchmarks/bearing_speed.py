@@ -134,12 +134,12 @@ def arcs(model: jc.BearingModel, speeds: np.ndarray) -> tuple[Any, ...]:
 
 def show_sweep(model: jc.BearingModel, speeds: np.ndarray, discard: int, revolutions: int) -> None:
     """Run the sweep twice, first to compile, and say what it took and what the whole would take."""
-    run = lambda discard, revolutions, blocks: jc.sweep_bearing(
+    run = lambda discard, revolutions, blocks: jc.sweep(
         model, speeds, starts=STARTS, discard=discard, revolutions=revolutions, blocks=blocks
     )
     run(1, 1, 1)
     found, wall, processor = measured(lambda: run(discard, revolutions, revolutions // BLOCK))
-    lanes, each = found.cage_slip.size, discard + revolutions
+    lanes, each = found["label"].size, discard + revolutions
     share = SPEEDS * STARTS * REVOLUTIONS / (lanes * each)
     rows = [
         ("", "measured", "", "all of it", ""),
@@ -150,11 +150,13 @@ def show_sweep(model: jc.BearingModel, speeds: np.ndarray, discard: int, revolut
         ("half the processor time", "", "", f"{processor * share / 120:.0f} (aim {MINUTES:.0f})", "min"),
     ]
     print(columns(rows))
-    mean = lambda x: f"{np.nanmin(x):.3g} to {np.nanmax(x):.3g}"
-    print(f"\nSlip {mean(found.cage_slip)}, largest pocket force {mean(found.pocket_force_max_N)} N")
-    print(f"Exponent {mean(found.exponent)}, its error {mean(found.exponent_error)}; steps {mean(found.steps)}")
-    failed, inaccurate = int(found.failed.sum()), int((found.outcome == "inaccurate").sum())
-    print(f"Error by half as many steps {mean(found.error)}; failed {failed}, inaccurate {inaccurate}")
+    mean = lambda name: f"{np.nanmin(found[name]):.3g} to {np.nanmax(found[name]):.3g}"
+    print(f"\nSlip {mean('cage_slip')}, largest pocket force {mean('pocket_force_max_N')} N")
+    print(f"Exponent {mean('exponents')}, its error {mean('standard_error')}; steps {mean('steps')}")
+    failed, inaccurate = (
+        int((found[name] == word).sum()) for name, word in (("label", "failed"), ("outcome", "inaccurate"))
+    )
+    print(f"Error {mean('error')}; failed {failed}, inaccurate {inaccurate}")
 
 
 def show_rivals(model: jc.BearingModel, speeds: np.ndarray) -> None:

@@ -99,7 +99,7 @@ def our_map(problem: Problem, method: jc.solve.AbstractMethod | None, revolution
         exponents=0,
         keep=1,
         method=method,
-    ).last[:, 0]
+    )["last"].values[:, 0]
 
 
 def constants(model: jc.CageModel, speeds: np.ndarray) -> np.ndarray:

@@ -8,9 +8,11 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 import jaxcage as jc
-from jaxcage.analysis import start_tangents
+from jaxcage.analysis import failed
+from jaxcage.lanes import start_tangents
 from tests import reference
 
 from .truth_models import Subject, by_kind, pair
@@ -55,29 +57,30 @@ def beside(model: jc.CageModel, rpm: float, state: np.ndarray, method: Any = Non
     speed = float(jc.rpm(rpm))
     options = dict(discard=0, revolutions=REVOLUTIONS, blocks=REVOLUTIONS, method=method, confirm=False, horizon=0)
     ours = jc.sweep(model, speed, starts=state[None, None], **options)  # pyright: ignore[reportArgumentType]
-    if ours.failed[0, 0]:  # as a start beyond the clearance is
+    if failed(ours)[0, 0]:  # as a start beyond the clearance is
         return None
     along = [float(c) for c in start_tangents(state.size, 1)[0]]
     try:
         theirs = reference.growth(reference.field(model, speed), state, REVOLUTIONS, direction=along, budget=BUDGET)
     except (reference.TooLong, ValueError, ArithmeticError):
         return None
-    return Beside(rpm, ours.block_growth[0, 0, :, 0], theirs, float(abs(ours.doubt[0, 0, 0])))
+    return Beside(rpm, ours["block_growth"].values[0, 0, :, 0], theirs, float(abs(ours["doubt"].values[0, 0, 0])))
 
 
-def settled(sweep: jc.Sweep) -> list[tuple[int, int]]:
+def settled(sweep: xr.Dataset) -> list[tuple[int, int]]:
     """Lanes that are neither chaotic nor lost, one start of a speed, few of them spread over the speeds."""
-    calm = ~sweep.failed & (sweep.label != "chaotic")
+    calm = ~failed(sweep) & (sweep["label"].values != "chaotic")
     speeds = np.flatnonzero(np.any(calm, axis=1))
     chosen = speeds[:: max(1, -(-speeds.size // SPEEDS))]
     return [(int(i), int(np.argmax(calm[i]))) for i in chosen]
 
 
-def moved(ours: jc.Sweep, theirs: jc.Sweep) -> tuple[np.ndarray, np.ndarray]:
+def moved(ours: xr.Dataset, theirs: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Differences of the exponents of lanes with one label that is not chaos, and which are beyond the error."""
-    alike = (ours.label == theirs.label) & ~ours.failed & (ours.label != "chaotic")
-    apart = np.abs(ours.exponents[..., 0] - theirs.exponents[..., 0])[alike]
-    error = np.hypot(ours.standard_error[..., 0], theirs.standard_error[..., 0])[alike]
+    label = ours["label"].values
+    alike = (label == theirs["label"].values) & ~failed(ours) & (label != "chaotic")
+    of = lambda name: [sweep[name].values[..., 0][alike] for sweep in (ours, theirs)]
+    apart, error = np.abs(np.subtract(*of("exponents"))), np.hypot(*of("standard_error"))
     return apart, apart > np.maximum(SIGMAS * error, LEAST)
 
 
@@ -85,7 +88,7 @@ def soft() -> list[str]:
     """Case 1a on a soft support: its exponent once was that of the steps."""
     model = jc.replace(jc.case("1a"), **SOFT)
     found = jc.sweep(model, jc.rpm(SOFT_RPM), discard=100, revolutions=100, horizon=0)
-    exponents = found.exponents[0, :, 0]
+    exponents = found["exponents"].values[0, :, 0]
     print(f"\n1a, support of 1e7 N/m, {SOFT_RPM:g} rpm: exponents {exponents.round(4)}, expected {SOFT_EXPONENT}")
     good = np.all(np.abs(exponents - SOFT_EXPONENT) < LEAST)
     return [] if good else [f"1a on the soft support has {exponents}, not {SOFT_EXPONENT}"]
@@ -104,7 +107,7 @@ def report(found: Sequence[Subject], quick: bool) -> list[str]:
         for subject in group:
             ours, theirs = pair(subject, quick)
             apart, bad = moved(ours, theirs)
-            lanes = [beside(subject.model, float(ours.rpm[i]), ours.last[i, j]) for i, j in settled(ours)]
+            lanes = [beside(subject.model, float(ours["rpm"][i]), ours["last"].values[i, j]) for i, j in settled(ours)]
             known = [lane for lane in lanes if lane is not None]
             away = [lane.apart for lane in known]
             text = f"{apart.size:9d}{np.sum(bad):9d}{np.max(apart, initial=0.0):9.0e}{len(known):9d}"

@@ -9,9 +9,10 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.stats import fisher_exact
 
 import jaxcage as jc
-from jaxcage.analysis import LIFE_BLOCK, Comparison, compare, survival
+from jaxcage.analysis import LIFE_BLOCK, Survival, failed, survival
 
 from .truth_models import Subject, by_kind, fine, pair
 
@@ -28,6 +29,19 @@ EXPLAINED = 0.05
 """Largest share of the speeds that may be explained so."""
 
 
+THREE_SIGMA = 0.0027
+SHARES = (0.01, 0.99)
+"""Share of lanes left between which a mean life is measured and not merely bounded."""
+
+
+def same_rate(first: Survival, second: Survival) -> float:
+    """Probability of escapes at least as unequal if both runs have one escape rate (Fisher's exact test)."""
+    if not first.chaotic or not second.chaotic:
+        return 0.0
+    table: Any = [[s.escapes, round(s.survived / s.block)] for s in (first, second)]
+    return float(fisher_exact(table)[1])  # pyright: ignore[reportArgumentType]
+
+
 class Doubted(NamedTuple):
     """A speed that is chaotic by one of the two alone."""
 
@@ -36,18 +50,19 @@ class Doubted(NamedTuple):
     """[rad/s]."""
     spurious: bool
     """Chaotic by the default; else by the finer steps."""
-    rates: Comparison
-    """Escape rates of perturbed starts by both."""
+    rates: tuple[Survival, Survival]
+    """Escapes of perturbed starts by both."""
 
     @property
     def explained(self) -> bool:
         """A transient of one rate, seen while some lanes have left it."""
-        return self.rates.agree and self.rates.resolved
+        resolved = all(SHARES[0] <= each.remaining <= SHARES[1] for each in self.rates)
+        return resolved and same_rate(*self.rates) >= THREE_SIGMA
 
     def __str__(self) -> str:
         what = "spurious" if self.spurious else "missed"
         why = "explained" if self.explained else "NOT explained"
-        text = str(self.rates).replace("\n", "\n    ")
+        text = "\n    ".join(map(str, self.rates))
         return f"{self.subject.kind} {self.subject.name}, {self.speed * 30 / np.pi:.1f} rpm, {what}, {why}:\n    {text}"
 
 
@@ -64,18 +79,17 @@ def escapes(subject: Subject, speed: float, method: Any = None) -> Any:
     length = LENGTH - SETTLED
     options = dict(discard=SETTLED, revolutions=length, blocks=length // LIFE_BLOCK, confirm=False, horizon=LENGTH + 1)
     found = jc.sweep(subject.model, speed, starts=perturbed(subject, speed), method=method, **options)  # pyright: ignore
-    assert found.escape is not None
-    times = np.maximum(found.escape.ravel() - SETTLED, 0.0)
+    times = np.maximum(found["escape"].values.ravel() - SETTLED, 0.0)
     return survival(times, length, block=LIFE_BLOCK)
 
 
 def doubted(subject: Subject, quick: bool) -> Iterator[Doubted]:
     """Speeds that are chaotic by one of the two alone."""
-    count = [np.sum(s.label == "chaotic", axis=1) for s in pair(subject, quick)]
+    count = [np.sum(s["label"].values == "chaotic", axis=1) for s in pair(subject, quick)]
     for spurious, (here, there) in ((True, count), (False, count[::-1])):
         for i in np.flatnonzero((here >= STARTS) & (there == 0)):
             speed = float(subject.grid(count[0].size)[i])
-            rates = compare(escapes(subject, speed), escapes(subject, speed, fine()))
+            rates = escapes(subject, speed), escapes(subject, speed, fine())
             yield Doubted(subject, speed, spurious, rates)
 
 
@@ -93,13 +107,22 @@ def report(found: Sequence[Subject], quick: bool) -> list[str]:
         for subject in group:
             ours, theirs = pair(subject, quick)
             new = list(doubted(subject, quick))
-            chaos = [int(np.sum(s.label == "chaotic")) for s in (ours, theirs)]
-            beside = [int(np.sum(ours.label == name)) for name in ("inaccurate", "failed")]
-            differ = int(np.sum((ours.label != theirs.label) & ~ours.failed & ~theirs.failed))
-            row = (ours.speed.size, ours.label.size, *chaos, differ, *beside, len(new), sum(d.explained for d in new))
+            labels = [s["label"].values for s in (ours, theirs)]
+            chaos = [int(np.sum(label == "chaotic")) for label in labels]
+            beside = [int(np.sum(labels[0] == name)) for name in ("inaccurate", "failed")]
+            differ = int(np.sum((labels[0] != labels[1]) & ~failed(ours) & ~failed(theirs)))
+            row = (
+                ours.sizes["speed"],
+                labels[0].size,
+                *chaos,
+                differ,
+                *beside,
+                len(new),
+                sum(d.explained for d in new),
+            )
             print(f"{subject.name:44s}" + "".join(f"{x:10d}" for x in row), flush=True)
             every += new
-            speeds += ours.speed.size
+            speeds += ours.sizes["speed"]
     print(*every, sep="\n")
     bad = [d for d in every if not d.explained]
     spurious = sum(d.spurious for d in bad)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 import jaxcage as jc
+from jaxcage.analysis import failed
 from tests import reference
 
 from .truth_models import Subject, by_kind
@@ -105,10 +106,11 @@ def compare(of: str, model: jc.CageModel, speeds: np.ndarray, starts: np.ndarray
     def beside(i: int, j: int, sharper: float = 1.0) -> Lane:
         field = reference.field(model, float(speeds[i]))
         end, noise, peak = truth(field, starts[i, j], sharper)
-        error = float(np.max(np.abs(found.last[i, j] - end) / field.scale))
-        return Lane(of, float(found.rpm[i]), str(found.label[i, j]), float(found.error[i, j]), error, noise, peak)
+        error = float(np.max(np.abs(found["last"].values[i, j] - end) / field.scale))
+        label, stated = str(found["label"].values[i, j]), float(found["error"][i, j])
+        return Lane(of, float(found["rpm"][i]), label, stated, error, noise, peak)
 
-    lanes = [beside(i, j) for i, j in np.ndindex(found.label.shape)]
+    lanes = [beside(i, j) for i, j in np.ndindex(found["label"].shape)]
     # Two integrators may agree by chance: what seems to be off is judged by a better reference.
     return [beside(*divmod(n, starts.shape[1]), SHARPER) if lane.off else lane for n, lane in enumerate(lanes)]
 
@@ -119,12 +121,11 @@ def of_model(subject: Subject, count: int) -> Iterator[list[Lane]]:
     first = states(model, speeds, subject.seed)
     yield compare(f"{subject.kind} {subject.name}, start", model, speeds, first)
     settled = jc.sweep(model, speeds, starts=first, discard=0, revolutions=SETTLING, exponents=0, blocks=1)
-    later = np.where(settled.failed[..., None], first, settled.last)
+    lost = failed(settled)
+    later = np.where(lost[..., None], first, settled["last"].values)
     lanes = compare(f"{subject.kind} {subject.name}, settled", model, speeds, later)
     inside = [bool(model.excursion(tuple(y)) <= 1) for y in later.reshape(len(lanes), -1)]  # others may not start
-    yield [
-        lane for lane, lost, starts in zip(lanes, settled.failed.ravel(), inside, strict=True) if starts and not lost
-    ]
+    yield [lane for lane, gone, starts in zip(lanes, lost.ravel(), inside, strict=True) if starts and not gone]
 
 
 COLUMNS = ("lanes", "known", "failed", "refused", "inacc.", "sure", "OFF", "stated", "largest", "error", "largest")

@@ -1,7 +1,7 @@
-"""What `simulate` and `orbit_measures` say beside 8 times the steps, and beside the reference's time history.
+"""Results of `simulate` and `measures` beside 8 times the steps, and beside the reference's time history.
 
 All three begin at one settled state and go on for as long as its orbit takes to close, so that chance has no part in
-it. The reference's samples go through `orbit_measures` like ours: compared is the motion, not the formulas.
+it. The reference's samples go through `measures` like ours: compared is the motion, not the formulas.
 """
 
 import dataclasses
@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 import jaxcage as jc
 from jaxcage.analysis import CLOSING_TOLERANCE
@@ -44,10 +45,11 @@ def numbers(model: jc.CageModel, run: jc.Trajectory, revolutions: int) -> Number
     """Of a trajectory that has one revolution more than is measured."""
     end = revolutions * run.samples
     part = {name: getattr(run, name)[:end] for name in ("time", "tau", "state", "speed")}
-    found = jc.orbit_measures(model, dataclasses.replace(run, **part))
+    found = jc.measures(model, dataclasses.replace(run, **part)).value
     c = float(model.clearance)
     apart = np.linalg.norm((run.state[end] - run.state[0])[:2]) / c
-    return Numbers(found.peak_contact_force, found.whirl_ratio, found.minimum_film_thickness / c, float(apart))
+    film = found("minimum_film_thickness") / c
+    return Numbers(found("peak_contact_force"), found("whirl_ratio"), film, float(apart))
 
 
 def by_reference(model: jc.CageModel, run: jc.Trajectory, revolutions: int) -> Numbers | None:
@@ -97,12 +99,12 @@ class Lane(NamedTuple):
         return wrong or (periodic and not self.ours.closure <= CLOSING_TOLERANCE + OFF["closure"])  # pyright: ignore
 
 
-def lane(model: jc.CageModel, sweep: jc.Sweep, i: int, j: int) -> Lane:
+def lane(model: jc.CageModel, sweep: xr.Dataset, i: int, j: int) -> Lane:
     """The j-th start at the i-th speed."""
-    label, speed, rpm = str(sweep.label[i, j]), float(sweep.speed[i]), float(sweep.rpm[i])
+    label, speed, rpm = str(sweep["label"].values[i, j]), float(sweep["speed"][i]), float(sweep["rpm"][i])
     period = int(label.partition("-")[2]) if label.startswith("periodic-") else 1
     count = period * -(-FEWEST // period)
-    run, beside = (history(model, speed, sweep.last[i, j], count, method) for method in (None, fine()))
+    run, beside = (history(model, speed, sweep["last"].values[i, j], count, method) for method in (None, fine()))
     if run.outcome != "successful":
         return Lane(rpm, label, run.outcome, None, {}, {})
     ours, exact = numbers(model, run, count), by_reference(model, run, count)

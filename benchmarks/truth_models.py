@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import xarray as xr
 
 import jaxcage as jc
 from jaxcage.models import CageModel, fastest_speed
@@ -82,7 +83,7 @@ def fine() -> AbstractMethod:
 
 
 @functools.cache
-def pair(subject: Subject, quick: bool) -> tuple[jc.Sweep, jc.Sweep]:
+def pair(subject: Subject, quick: bool) -> tuple[xr.Dataset, xr.Dataset]:
     """A model over its grid of speeds as by default, its labels confirmed, and by the finer steps."""
     grid = subject.grid(FEW if quick else GRID)
     return jc.sweep(subject.model, grid, horizon=0), jc.sweep(

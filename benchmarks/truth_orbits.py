@@ -55,15 +55,16 @@ class Beside(NamedTuple):
 def found_orbits(subject: Subject, quick: bool) -> Iterator[jc.Orbit]:
     """Orbits to which lanes of the default sweep lead, of each speed one, few of them spread over the speeds."""
     sweep, _ = pair(subject, quick)
-    period = np.zeros(sweep.label.shape, dtype=int)
+    label = sweep["label"].values
+    period = np.zeros(label.shape, dtype=int)
     for k in range(1, LONGEST + 1):
-        period[sweep.label == f"periodic-{k}"] = k
+        period[label == f"periodic-{k}"] = k
     good = period > 0
     speeds = np.flatnonzero(np.any(good, axis=1))
     for i in speeds[:: max(1, -(-speeds.size // SPEEDS))]:
         j = int(np.argmax(good[i]))
-        guess = sweep.last[i, j]
-        yield jc.periodic_orbit(subject.model, float(sweep.speed[i]), int(period[i, j]), guess=tuple(guess.tolist()))
+        guess, speed = tuple(sweep["last"].values[i, j].tolist()), float(sweep["speed"][i])
+        yield jc.periodic_orbit(subject.model, speed, int(period[i, j]), guess=guess)
 
 
 def finer(orbit: Any, times: int = TIMES) -> FixedSteps:

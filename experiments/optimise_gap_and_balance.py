@@ -50,7 +50,7 @@ def check(design):
 
 before, after = check(model), check(found.best.model)
 for name, sweep in (("before", before), ("after", after)):
-    share = np.mean(np.any(sweep.label == "chaotic", axis=1))
+    share = float((sweep["label"] == "chaotic").any("start").mean())
     print(name, f"{share:.0%} of the speeds chaotic", jc.zones(sweep), sep="\n")
 save(design_figure(found, before, after), "optimise_gap_and_balance")
 

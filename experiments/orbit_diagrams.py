@@ -27,7 +27,8 @@ jc.enable_x64()
 speeds = jc.rpm(6000, 14000, small(81, 12))
 names = ("1a", "1b")
 length = dict(discard=small(200, 30), revolutions=small(200, 20))
-sweeps = dict(zip(names, jc.sweep_designs([jc.case(name) for name in names], speeds, **length), strict=True))
+swept = jc.sweep([jc.case(name) for name in names], speeds, **length)
+sweeps = {name: swept.isel(design=i) for i, name in enumerate(names)}
 for name, sweep in sweeps.items():
     print(name, jc.zones(sweep), sep="\n")
 

@@ -48,8 +48,8 @@ method = jc.method("rodas4", steps=64)
 # %%
 forces = np.linspace(0.20, 0.50, small(400, 48))
 one = dict(starts=[(0.4, 0.3)], discard=small(300, 50), revolutions=small(200, 40), blocks=10, method=method)
-swept = jc.sweep_designs([make(f) for f in forces], np.array([1.2]), **one)
-exponent = np.array([s.exponents[0, 0, 0] for s in swept])
+swept = jc.sweep([make(f) for f in forces], np.array([1.2]), **one).isel(speed=0, start=0)
+exponent = swept["exponents"].values[:, 0]
 print(f"{np.mean(exponent > 0.02):.0%} of the forces are chaotic; largest exponent {exponent.max():.3f} per revolution")
 
 # %%
@@ -66,7 +66,7 @@ print(
 # %%
 figure = new_figure(10.0, 5.0)
 above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-strobe = np.array([s.strobe[0, 0, :, 0] for s in swept])
+strobe = swept["strobe"].isel(component=0).values
 above.plot(np.repeat(forces, strobe.shape[1]), strobe.ravel(), ",", color="#0072B2")
 above.axvline(float(point.value), color="#D55E00", linewidth=0.8)
 above.set_ylabel("x at phase 0")

@@ -320,8 +320,8 @@ def replace(module: M, **values: PyTree) -> M:
     _require_module(module)
     leaves, choices = parameter_paths(module), choice_paths(module)
     parts = [f.name for f in dataclasses.fields(module) if isinstance(getattr(module, f.name), eqx.Module)]
-    if hasattr(module, "forces"):
-        named = {part_path(law)[0]: None for law in (*module.forces, *values.values())}
+    if laws := getattr(module, "forces", ()):
+        named = {part_path(law)[0]: None for law in (*laws, *values.values())}
         parts += ["forces", *({EXTRA: None} | named)]
     fields = dict(walk(module))
     for name, value in values.items():

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 from helpers import elastic, roller_pass
+from jaxcage.cli._main import _parse
+from jaxcage.report import readings_words
 
 import jaxcage as jc
 from jaxcage.cli import main
-from jaxcage.cli._main import _parse
 from jaxcage.files import (
     ConfigError,
     configuration,
@@ -23,7 +24,6 @@ from jaxcage.files import (
     to_si,
     toml_text,
 )
-from jaxcage.report import readings_words
 
 
 # --- units -----------------------------------------------------------------------------------

@@ -11,8 +11,8 @@ from literature import DUFFING_DOUBLINGS
 from reference import bifurcation as shooting
 
 import jaxcage as jc
-from jaxcage.solve import FixedSteps, strobe_map
 from jaxcage.orbits import Point, edge_speed, sensitivity
+from jaxcage.solve import FixedSteps, strobe_map
 
 
 RPM = np.pi / 30

@@ -10,13 +10,15 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import jaxcage as jc
+
 from .options import ShowOptions
 from .progress import visible
+from .subject import Subject
 
 
 if TYPE_CHECKING:
     from ..show import Table
-    from .subject import Subject
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,7 +32,7 @@ class Answer:
     notes: Sequence[str] = ()
     document: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """More for programs, in SI units unless a name ends in another one."""
-    subject: "Subject | None" = None
+    subject: Subject | None = None
     files: Mapping[str, tuple[str, Any]] = dataclasses.field(default_factory=dict)
     """Key in the document -> end of the file's name, and a figure, columns of numbers, a data set or a text."""
     stored: Mapping[str, str] = dataclasses.field(default_factory=dict)
@@ -41,16 +43,14 @@ class Answer:
 
 def complete(answer: Answer, command: str, show: ShowOptions | None, seconds: float) -> Answer:
     """Write the files of an answer, and add what every command prints."""
-    written, subject = dict(answer.stored), answer.subject
+    written, subject, notes = dict(answer.stored), answer.subject, list(answer.notes)
     document = {table.key: table.records for table in answer.tables if table.key} | dict(answer.document)
-    notes = list(answer.notes)
     if show is not None:
         stem = f"{command}_{subject.name}" if subject else command
         for key, (ending, content) in answer.files.items():
             written[key] = str(_write(Path(show.out) / f"{stem}{ending}", content, show, subject))
     if subject is not None:
-        document = {"case": subject.name} | document | subject.document
-        notes += subject.notes
+        document, notes = {"case": subject.name} | document | subject.document, notes + subject.notes
     if show is not None:
         document["seconds"] = round(seconds, 2)
         notes.append(f"Time: {seconds:.1f} s")
@@ -58,35 +58,27 @@ def complete(answer: Answer, command: str, show: ShowOptions | None, seconds: fl
     return dataclasses.replace(answer, document=document | written, notes=notes)
 
 
-def _write(path: Path, content: Any, show: ShowOptions, subject: "Subject | None") -> Path:
+def _write(path: Path, content: Any, show: ShowOptions, subject: Subject | None) -> Path:
     """Write one file, whole or not at all."""
     import xarray as xr
-    from matplotlib.figure import Figure
-
-    from ..files import replacing
-    from ..show import write_columns
-    from ..lanes import save
-    from ..show import add_shaft_axes, restyle
 
     if isinstance(content, xr.Dataset):
-        return save(path, content)
+        return jc.lanes.save(path, content)
     if isinstance(content, Mapping):
-        return write_columns(path, content)
-    with replacing(path) as temporary:
-        if isinstance(content, Figure):
-            if subject is not None and subject.shaft is not None:
-                add_shaft_axes(content, 1 / subject.shaft)
-            restyle(content, show.style).savefig(temporary, dpi=content.dpi)
-        else:
+        return jc.show.write_columns(path, content)
+    with jc.files.replacing(path) as temporary:
+        if isinstance(content, str):
             temporary.write_text(content, encoding="utf-8")
+        else:
+            if subject is not None and subject.shaft is not None:
+                jc.show.add_shaft_axes(content, 1 / subject.shaft)
+            jc.show.restyle(content, show.style).savefig(temporary, dpi=content.dpi)
     return path
 
 
 def drawn(title: str, draw: Callable[[Any], Any], width: float = 9.0, height: float = 5.0) -> Any:
     """A figure of one diagram, which `draw` draws on its axes."""
-    from ..show import new_figure
-
-    figure = new_figure(width, height)
+    figure = jc.show.new_figure(width, height)
     draw(figure.subplots())
     figure.suptitle(title, fontsize=11)
     return figure
@@ -103,10 +95,7 @@ def print_answer(answer: Answer, as_json: bool) -> None:
         if as_json:
             print(json.dumps(plain(answer.document), indent=2, allow_nan=False))
         else:
-            print(f"{answer.sentence}\n")
-            for table in answer.tables:
-                _print_on_terminal(table) if sys.stdout.isatty() else print(f"{table}\n")
-            print("\n".join(answer.notes))
+            print("\n\n".join([answer.sentence, *map(str, answer.tables), "\n".join(answer.notes)]))
         sys.stdout.flush()
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or Python tries again at its end, and complains
@@ -130,18 +119,3 @@ def plain(value: Any) -> Any:
         return plain(value.tolist())
     number = float(value)
     return number if math.isfinite(number) else None
-
-
-def _print_on_terminal(table: "Table") -> None:
-    import rich.box
-    import rich.console
-    import rich.table
-    from rich.text import Text
-
-    # Text and not str: units in square brackets are not markup.
-    drawn = rich.table.Table(title=Text(table.title), title_justify="left", box=rich.box.SIMPLE_HEAD, pad_edge=False)
-    for i, head in enumerate(table.heads):
-        drawn.add_column(Text(head), justify="left" if i == 0 else "right")
-    for row in table.rows:
-        drawn.add_row(*map(Text, row))
-    rich.console.Console().print(drawn)

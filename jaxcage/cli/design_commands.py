@@ -1,16 +1,21 @@
 """Commands about designs: better ones, tolerances, and values that are known within ranges only."""
 
-import dataclasses
 import hashlib
 import math
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import tyro
 
+import jaxcage as jc
+
+from .._errors import InputError
 from . import options as o
 from .answer import Answer, drawn
+from .subject import RPM, Subject, read_case
+from .values import no_worse_balance, read_bounds, read_each, read_scatter
 
 
 LOADS = {"wear": "wear load", "force": "peak land force", "power": "film drag power"}
@@ -19,19 +24,21 @@ CHECKED_SPEEDS = 118
 """Speeds of the sweeps by which a design is checked: every 200 rpm of the usual range."""
 FINER, STARTS = 2, 3
 """Multiple of the speeds of a search in the comparison of its best designs, and their initial states."""
-ADVICE = "the same command goes on where the search stopped"
-Vary = Annotated[o.Texts, tyro.conf.arg(metavar="NAME=LOWER:UPPER", help="Parameter to change, and its bounds.")]
+DESIGNED = o.Range(4000.0, 27500.0)
+"""Speeds at which designs of a cage are assessed; their number is 48 unless given."""
+Vary = Annotated[
+    o.Texts,
+    tyro.conf.arg(
+        metavar="NAME=LOWER:UPPER", help="Parameter to change with its bounds, e.g. guidance_gap=0.3mm:0.6mm."
+    ),
+]
 
 
 def design(
     case: o.Case,
     *,
     vary: Vary = (),
-    first: o.First = 4000.0,
-    last: o.Last = 27500.0,
-    speeds: o.FromTwo = 48,
-    speed: o.OptionalSpeed = None,
-    load: o.Load = None,
+    over: o.Range = DESIGNED,
     cost: o.Price = None,
     wear: o.Price = None,
     force: o.Price = None,
@@ -42,24 +49,21 @@ def design(
     worse_balance: bool = False,
     scatter: Annotated[o.Texts, tyro.conf.arg(metavar="NAME=LAW")] = (),
     worst: Annotated[float, o.number("be above 0 and at most 1", lambda x: 0 < x <= 1)] = 1.0,
-    starts: o.FromOne = 1,
+    searches: o.FromOne = 1,
     scouts: o.FromZero = 0,
     steps: o.OptionalCount = None,
     batch: o.OptionalCount = None,
-    ensemble: o.FromOne = 4,
-    discard: o.FromZero = 10,
-    revolutions: o.FromTwo = 20,
     seed: o.Seed = 0,
     quick: o.Quick = False,
+    means: o.MeanOptions = o.MeanOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Change the design so that fewer speeds are chaotic; of a bearing so that wear, forces and losses at one speed are small.
+    """Change the design so that fewer speeds are chaotic; of a bearing so that wear, forces and losses are small.
 
     The best design is compared with the given one by fresh runs. Prices are in rpm of chaotic speeds for the present
-    value, and of a bearing weights of relative values.
+    value, and of a bearing with its rollers weights of relative values.
 
     Args:
-        speeds: Speeds between first and last at which a design is assessed.
         cost: Price of a unit of manufacturing cost; 1000 if left out.
         wear: Price of wear; 1000 if left out, of a bearing 1.
         force: Price of the peak force on the land, and of a bearing on pockets; 1000 if left out, of a bearing 1.
@@ -70,309 +74,212 @@ def design(
         worse_balance: Let the cage be balanced worse than it is.
         scatter: Manufacturing scatter of a parameter: guidance_gap=10% or eccentricity=rayleigh; the mean counts.
         worst: With --scatter: mean over this share of the manufactured cages, the worst ones.
-        starts: Searches: one from the design itself, others from the best of the scouts.
+        searches: One from the design itself, others from the best of the scouts.
         scouts: Designs spread over the bounds that are looked at beforehand.
         steps: Steps of each search; 10 if left out, of a bearing 12.
         batch: Designs of a step; 12 if left out, of a bearing 16.
-        ensemble: Of a bearing: drawn initial states of each design.
-        discard: Of a bearing: revolutions left out.
-        revolutions: Of a bearing: revolutions observed, an even number.
     """
-    from .. import design as d, show as shown
-    from .._errors import InputError
-    from .subject import RPM, read_case
-    from .values import no_worse_balance, read_bounds, read_each, read_scatter
-
-    subject = read_case(case, load)
-    model, bearing = subject.model, subject.reports_means
-    bounds = read_bounds(vary, subject, d.CAGE_PARAMETERS if bearing else ())
+    subject, d = read_case(case, means.load), jc.design
+    model, bounds = subject.model, read_bounds(vary, subject)
     notes = [] if worse_balance else no_worse_balance(model, bounds)
     laws = read_each("--scatter", scatter, "NAME=10% or NAME=rayleigh", partial(read_scatter, tuple(bounds)))
-    if 0 < scouts < starts - 1:
-        raise InputError(f"Option --scouts must be 0 or at least {starts - 1}, but {scouts} was given.")
+    if 0 < scouts < searches - 1:
+        raise InputError(f"Option --scouts must be 0 or at least {searches - 1}, but {scouts} was given.")
     if worst < 1 and not laws:
         raise InputError("Option --worst goes with --scatter.")
-    prices = {"wear": wear, "force": force, "impulse": impulse, "power": power, "slip": slip, "balance": balance}
-    prices = {name: _price(name, given, bearing) for name, given in prices.items()}
-    at = None
-    if bearing:
-        if not sum(prices.values()):
-            raise InputError(f"Options {', '.join(f'--{name}' for name in prices)} must not all be 0.")
-        at = one_speed(subject, speed)
-        runs = d.Runs.of_bearing(at, ensemble, discard, revolutions, seed=seed)
-        fresh, objective_of = runs.fresh(), None
-    else:
-        low, high = subject.range(first, last, 2) * RPM
-        chaos = d.chaotic_width(low, high, speeds)
-        finer = d.chaotic_width(low, high, FINER * speeds, starts=STARTS)
-        runs, fresh, price = chaos.runs, finer.runs, 1000.0 if cost is None else cost
+    usual = subject.usual({"wear": 1e3, "force": 1e3, "power": 0.0}, dict.fromkeys(d.TERMS, 1.0))
+    given = {"wear": wear, "force": force, "impulse": impulse, "power": power, "slip": slip, "balance": balance}
+    prices = {name: price if given[name] is None else given[name] for name, price in usual.items()}
+    if subject.with_rollers and not sum(prices.values()):
+        raise InputError(f"Options {', '.join(f'--{name}' for name in prices)} must not all be 0.")
+    runs, chaos, finer = _runs(subject, over, means, seed)
+    count, per_step = steps or subject.usual(10, 12), batch or subject.usual(12, 16)
+    asked = repr((model, bounds, prices, cost, over, means, searches, scouts, per_step, seed, scatter, worst))
+    stored = Path(show.out) / f".design_{subject.name}_{hashlib.sha256(asked.encode()).hexdigest()[:12]}.npz"
+    search = {"starts": searches, "scouts": scouts, "batches": count, "batch": per_step, "seed": seed, "keep": stored}
 
-        def objective_of(width: Any) -> Any:
-            loads = [(LOADS[n], prices[n]) for n in LOADS if prices[n]]
-            total = sum((d.relative(d.LandLoad(width.runs, n), model, p) for n, p in loads), start=width)
-            total = d.Robust(total, laws, worst=worst, seed=seed) if laws else total
-            return total + price * d.cost() if price else total
+    def objective_of(width: Any) -> Any:
+        loads = [(LOADS[name], price) for name, price in prices.items() if price]
+        total = sum((d.relative(d.LandLoad(width.runs, n), model, p) for n, p in loads), start=width)
+        total = d.Robust(total, laws, worst=worst, seed=seed) if laws else total
+        return total + (1e3 if cost is None else cost) * d.cost() if cost != 0 else total
 
-    about = repr(
-        (subject.name, model, bounds, prices, cost, first, last, speeds, at, starts, scouts, batch, seed, laws)
-    )
-    stored = Path(show.out) / f".design_{subject.name}_{hashlib.sha256(about.encode()).hexdigest()[:12]}.npz"
-    batches = steps or subject.usual(10, 12)
-    search = {
-        "starts": starts,
-        "scouts": scouts,
-        "batches": batches,
-        "batch": batch or subject.usual(12, 16),
-        "seed": seed,
-    }
-    with show.computing(f"design {subject.name}", ADVICE) as say:
-        objective = d.bearing_objective(model, bounds, runs, prices) if objective_of is None else objective_of(chaos)
-        report = lambda step, _: say("search", step, batches)
-        found = d.surrogate_search(model, bounds, objective, keep=stored, report=report, **search)
+    with show.computing(f"design {subject.name}", "the same command goes on where the search stopped") as say:
+        own = d.bearing_objective(model, bounds, runs, prices) if chaos is None else objective_of(chaos)
+        found = d.surrogate_search(model, bounds, own, **search, report=lambda step, _: say("search", step, count))
         say("fresh runs", 0, 1)
-        if objective_of is None:
-            statistics: Any = {name: d.statistic(fresh, name) for name in (*d.COMPARED, d.BALANCE)}
-            statistics |= {d.OBJECTIVE: objective.on(fresh)}
+        fresh, better = runs.fresh() if chaos is None else finer.runs, False
+        if chaos is None:
+            statistics = {n: d.statistic(fresh, n) for n in (*d.COMPARED, d.BALANCE)} | {d.OBJECTIVE: own.on(fresh)}
         else:
             found, itself = d.confirmed(found, objective_of(finer))
-            statistics = {"chaotic speeds": finer} | {n: d.LandLoad(fresh, n) for n in (*d.LAND_LOADS, "least film")}
-            statistics |= {d.BALANCE: d.statistic(fresh, d.BALANCE)}
+            statistics = {"chaotic speeds": finer, d.BALANCE: d.statistic(fresh, d.BALANCE)}
+            statistics |= {name: d.LandLoad(fresh, name) for name in (*d.LAND_LOADS, "least film")}
+            better = found.best.objective < itself
         rows, failed = d.before_and_after(model, found.best.model, fresh, statistics)
-        answer = _compared(subject, found, rows, first, last, seed, quick, show, say)
+        answer = _compared(subject, found, rows, over, seed, quick, say)
     stored.unlink(missing_ok=True)
-    best = found.best
-    better = found.best.objective < (itself if objective_of else 1.0)
-    if bearing:
-        overall = next(row for row in rows if row.name == d.OBJECTIVE)
-        better = overall.known and overall.change < 0
+    best, by_name = found.best, {row.name: row for row in rows}
+    if d.OBJECTIVE in by_name:
+        better = by_name[d.OBJECTIVE].known and by_name[d.OBJECTIVE].change < 0
     values = ", ".join(f"{name} {value:.4g}" for name, value in best.values.items())
     said = (
-        f"A better design was found: {values} (SI units)."
-        if better
-        else "No better design was found: the given one stays."
+        f"A better design was found (SI): {values}." if better else "No better design was found: the given one stays."
     )
-    notes += [
-        f"Search: {best.status}, {len(best.history)} steps, objective {best.objective:.4g}",
-        f"At a bound: {', '.join(best.at_bound)}." if best.at_bound else "No parameter ended at a bound.",
-        f"Fresh runs that failed: {failed}",
-    ]
-    document = {"vary": bounds, "prices": prices, "better": better, "optimum": best.values, "objective": best.objective}
-    document |= {
-        "at_bound": best.at_bound,
-        "status": best.status,
-        "failed": failed,
-        **({} if at is None else subject.both(at)),
-    }
+    notes += [f"Search: {best.status}, {len(best.history)} steps, objective {best.objective:.4g}"]
+    notes += [f"At a bound: {', '.join(best.at_bound) or 'no parameter'}", f"Fresh runs that failed: {failed}"]
+    document = {"vary": bounds, "prices": prices, "better": better, "optimum": best.values, "failed": failed}
+    document |= {"objective": best.objective, "at_bound": best.at_bound, "status": best.status}
     tables = [
-        shown.before_and_after_table("Before and after, from the same initial states", rows),
-        shown.parameters_table(f"Design of {subject.name}", model, found, bounds),
-        shown.optima_table(model, found),
+        jc.show.before_and_after_table("Before and after, from the same initial states", rows),
+        jc.show.changed_table(f"Design of {subject.name}", model, found, bounds),
+        jc.show.optima_table(model, found),
         *answer.tables,
     ]
     return Answer(said, tables, [*notes, *answer.notes], document | answer.document, subject, answer.files)
 
 
-def _price(name: str, given: float | None, bearing: bool) -> float:
-    """A price as given, or the usual one."""
-    usual = 1.0 if bearing else {"wear": 1000.0, "force": 1000.0}.get(name, 0.0)
-    return usual if given is None else given
+def _runs(subject: Subject, over: o.Range, means: o.MeanOptions, seed: int, **more: Any) -> tuple[Any, Any, Any]:
+    """How designs are run; of a cage the width of its chaotic speeds, and the same by more speeds and initial states."""
+    if subject.with_rollers:
+        length = means.length(starts=4, discard=10, revolutions=20)
+        return jc.design.Runs.of_bearing(subject.speed(means.speed), **length, seed=seed, **more), None, None
+    low, *_, high = subject.range(o.Range(over.first, over.last), 2) * RPM
+    width = partial(jc.design.chaotic_width, low, high)
+    chaos = width(over.count or 48, **more)
+    return chaos.runs, chaos, width(FINER * (over.count or 48), starts=STARTS)
 
 
-def one_speed(subject: Any, given: float | None) -> float:
-    """The one speed [rad/s] that a command needs for a bearing.
-
-    **Raises:** `InputError` if none is given.
-    """
-    from .._errors import InputError
-
-    if given is None:
-        raise InputError('Option --speed must be given for a bearing, e.g. --speed "10000 rpm shaft".')
-    return subject.speed(given)
-
-
-def _compared(
-    subject: Any, found: Any, rows: Any, first: float, last: float, seed: int, quick: bool, show: Any, say: Any
-) -> Answer:
+def _compared(subject: Subject, found: Any, rows: Any, over: o.Range, seed: int, quick: bool, say: Any) -> Answer:
     """Figure of a search; of a cage with zones of the designs before and after, by sweeps from other initial states."""
-    import numpy as np
-
-    from .. import show as shown
-    from ..analysis import restless, zones
-    from ..lanes import sweep
-    from ..orbits import loss_zones, synchronous_orbits
-
-    if subject.reports_means:
-        return Answer("", files={"figure": (".png", shown.optimum_figure(found, rows, subject.name))})
-    speeds, half = subject.range(first, last, CHECKED_SPEEDS), subject.model.dimension // 2
-    size = float(subject.model.clearance) * np.array([1.0] * half + [0.3 * speeds[0]] * half)
-    states = [tuple(0.6 * size * np.random.default_rng(seed + 1 + i).uniform(-1, 1, size.size)) for i in range(STARTS)]
-    document: dict[str, Any] = {"chaotic_rpm": {}, "chaotic_zones": {}, "synchronous_loss_zones": {}}
-    swept = []
-    for when, model in (("before", subject.model), ("after", found.best.model)):
+    if subject.with_rollers:
+        return Answer("", files={"figure": (".png", jc.show.optimum_figure(found, rows, subject.name))})
+    model, speeds = subject.model, subject.range(o.Range(over.first, over.last), CHECKED_SPEEDS)
+    rng, half = np.random.default_rng(seed + 1), model.dimension // 2
+    size = float(model.clearance) * np.array([1.0] * half + [0.3 * speeds[0]] * half)
+    states = [tuple(0.6 * size * rng.uniform(-1, 1, size.size)) for _ in range(STARTS)]
+    swept, chaotic, lost, rpm = [], [], [], []
+    for when, each in (("before", model), ("after", found.best.model)):
         given = {"starts": states, "discard": 300, "revolutions": 200, "progress": partial(say, f"sweep {when}")}
-        swept.append(sweep(model, speeds, **given))
-        document["chaotic_rpm"][when] = float(np.mean(restless(swept[-1])) * np.ptp(swept[-1]["rpm"].values))
-        document["chaotic_zones"][when] = [shown.zone_record(zone) for zone in zones(swept[-1]).zones]
+        swept.append(jc.sweep(each, speeds, **given))
+        rpm.append(float(np.mean(jc.analysis.restless(swept[-1])) * np.ptp(swept[-1]["rpm"].values)))
+        chaotic += [{"design": when, **jc.show.zone_record(zone)} for zone in jc.zones(swept[-1]).zones]
         if not quick:
-            loss = loss_zones(synchronous_orbits(model, speeds[0], speeds[-1], progress=say))
-            document["synchronous_loss_zones"][when] = [shown.zone_record(zone) for zone in loss.zones]
-    columns = [shown.Column(head, ()) for head in ("design", "zone")]
-    columns += [shown.Column(end, (), key=f"{end}_rpm", digits=0) for end in ("onset", "exit", "width")]
-    tables = []
-    for kind in ("chaotic", "synchronous_loss"):
-        each = document[f"{kind}_zones"].items()
-        lines = [{"design": when, "zone": i, **zone} for when, of in each for i, zone in enumerate(of, start=1)]
-        tables += (
-            [shown.rows_table(f"{kind.replace('_', '-').capitalize()} zones [rpm]", lines, columns)] if lines else []
-        )
-    note = "Chaotic speeds by sweeps from other initial states: {before:.0f} rpm before, {after:.0f} rpm after"
-    notes = [note.format_map(document["chaotic_rpm"])]
-    return Answer("", tables, notes, document, files={"figure": (".png", shown.design_figure(found, *swept))})
+            loss = jc.loss_zones(jc.orbits.synchronous_orbits(each, speeds[0], speeds[-1], progress=say))
+            lost += [{"design": when, **jc.show.zone_record(zone)} for zone in loss.zones]
+    columns = [jc.show.Column("design", ())]
+    columns += [jc.show.Column(end, (), key=f"{end}_rpm", digits=0) for end in ("onset", "exit", "width")]
+    kinds = (("Chaotic", chaotic), ("Synchronous-loss", lost))
+    tables = [jc.show.rows_table(f"{kind} zones [rpm]", rows, columns) for kind, rows in kinds]
+    notes = [f"Chaotic speeds, by sweeps from other initial states: {rpm[0]:.0f} rpm before, {rpm[1]:.0f} rpm after"]
+    document = {"chaotic_rpm": rpm, "chaotic_zones": chaotic, "synchronous_loss_zones": lost}
+    return Answer("", tables, notes, document, files={"figure": (".png", jc.show.design_figure(found, *swept))})
 
 
 def sensitivity(
     case: o.Case,
     *,
     vary: Vary = (),
-    first: o.First = 4000.0,
-    last: o.Last = 27500.0,
-    speeds: o.FromTwo = 48,
-    speed: o.OptionalSpeed = None,
-    load: o.Load = None,
+    over: o.Range = DESIGNED,
     of: str = "wear",
     samples: o.OptionalCount = None,
     tolerance: Annotated[float, o.number("lie between 0 and 100 percent", lambda x: 0 < x < 100)] = 5.0,
-    ensemble: o.FromOne = 4,
-    discard: o.FromZero = 10,
-    revolutions: o.FromTwo = 20,
     seed: o.Seed = 0,
     quick: o.Quick = False,
+    means: o.MeanOptions = o.MeanOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
     """Shares of each parameter in the chaotic speeds over its range, and effect of tolerances on the exact edges.
 
-    The same of a measure of a bearing with its rollers at one speed, such as its wear.
+    Of a bearing with its rollers the same of a measure at one speed, such as its wear.
 
     Args:
-        speeds: Speeds between first and last at which a design is assessed.
         of: Of a bearing: measure, such as wear, power, slip or pocket_force_peak_N.
         samples: Base samples of the Sobol indices, a power of 2; 64 if left out, of a bearing 32.
         tolerance: Tolerance of every parameter but constants, ± so many percent, uniformly distributed.
-        ensemble: Of a bearing: drawn initial states of each design.
-        discard: Of a bearing: revolutions left out.
-        revolutions: Of a bearing: revolutions observed, an even number.
     """
-    from .. import design as d, show as shown
-    from .._errors import InputError
-    from ..orbits import loss_zones, sensitivities, synchronous_orbits
-    from .subject import RPM, read_case
-    from .values import read_bounds
-
-    subject = read_case(case, load)
-    model, bearing = subject.model, subject.reports_means
-    samples = samples or subject.usual(64, 32)
-    require_power(samples)
-    bounds = read_bounds(vary, subject, d.CAGE_PARAMETERS if bearing else ())
-    deviation, document = tolerance / 100 / math.sqrt(3), {"vary": bounds, "tolerance_percent": tolerance}
-    budgets, files = [], {}
-    with show.computing(f"sensitivity {subject.name}") as say:
-        told = {"progress": partial(say, "designs")}
-        if bearing:
-            if of not in d.BEARING_MEASURES:
-                raise InputError(f"Option --of must be one of {', '.join(d.BEARING_MEASURES)}, but '{of}' was given.")
-            at = one_speed(subject, speed)
-            what, document = (
-                f"{of.replace('_', ' ').capitalize()} of {subject.name}",
-                document | {"of": of, **subject.both(at)},
-            )
-            objective = d.measure(d.Runs.of_bearing(at, ensemble, discard, revolutions, seed=seed, **told), of)
-        else:
-            low, high = subject.range(first, last, 2) * RPM
-            what, objective = f"Chaotic speeds of {subject.name}", d.chaotic_width(low, high, speeds, **told)
+    subject, d = read_case(case, means.load), jc.design
+    model, name, bounds = subject.model, subject.name, read_bounds(vary, subject)
+    samples, files = _power(samples or subject.usual(64, 32)), {}
+    if of not in d.BEARING_MEASURES:
+        raise InputError(f"Option --of must be one of {', '.join(d.BEARING_MEASURES)}, but '{of}' was given.")
+    with show.computing(f"sensitivity {name}") as say:
+        runs, chaos, _ = _runs(subject, over, means, seed, progress=partial(say, "designs"))
+        objective = d.measure(runs, of) if chaos is None else chaos
         shares = d.global_sensitivity(model, bounds, objective, samples=samples, seed=seed)
-        if bearing and not quick:
-            runs = d.Runs(at, starts=2, discard=discard, revolutions=revolutions, blocks=2, exponents=0, tolerance=1e-4)
-            spread = min(max(tolerance / 100, 0.05), 0.3)
-            slopes = d.mean_gradient(model, runs, {of: d.measure(runs, of)}, spread=spread, seed=seed)
-            budgets = [_budget(d, slopes.statistics[of], slopes.statistics[of].directions, deviation)]
-            files["figure"] = ".png", shown.statistic_bars(slopes, f"{what}: elasticities")
+        slopes: list[tuple[Any, Any]] = []
+        if chaos is None and not quick:
+            known = jc.parameters(model)
+            directions = [x for x in d.DIRECTIONS if all(float(known[each]) for each in x.split("+"))]
+            length = means.length(discard=10, revolutions=20)
+            near = d.Runs(runs.speeds, starts=2, **length, blocks=2, exponents=0, tolerance=1e-4)
+            spread = float(np.clip(tolerance / 100, 0.05, 0.3))
+            given = {"directions": directions, "spread": spread, "seed": seed}
+            found = d.mean_gradient(model, near, {of: d.measure(near, of)}, **given)
+            slopes = [(found.statistics[of], directions)]
+            files["figure"] = ".png", jc.show.statistic_bars(found, f"{name}: elasticities")
         elif not quick:
-            loss = loss_zones(synchronous_orbits(model, *(subject.range(first, last, 2)), progress=say))
-            edges = [s for s in sensitivities(model, loss.edges).values() if s.trusted]
-            budgets = [_budget(d, s, shown.not_fixed(model, s.elasticity), deviation) for s in edges]
-            bars = lambda ax: shown.elasticity_bars(shown.to_be_turned(model, edges), ax)
-            files |= (
-                {"figure": (".png", drawn(f"{subject.name}: elasticities", bars, 9.0, 2.2 + 1.2 * len(edges)))}
-                if edges
-                else {}
-            )
-    most = max(shares.total, key=lambda n: shares.total[n])
+            ends = subject.range(o.Range(over.first, over.last), 2)
+            loss = jc.loss_zones(jc.orbits.synchronous_orbits(model, *ends, progress=say))
+            edges = [s for s in jc.orbits.sensitivities(model, loss.edges).values() if s.trusted]
+            slopes = [(s, jc.show.not_fixed(model, s.elasticity)) for s in edges]
+            bars = lambda ax: jc.show.elasticity_bars(jc.show.to_be_turned(model, edges), ax)
+            files |= {"figure": (".png", drawn(name, bars, 9.0, 2.2 + 1.2 * len(edges)))} if edges else {}
+    deviation = tolerance / 100 / math.sqrt(3)
+    budgets = [d.tolerance_budget(slope, dict.fromkeys(names, deviation)) for slope, names in slopes]
+    most, what = max(shares.total, key=shares.total.__getitem__), subject.usual("chaotic speeds", of.replace("_", " "))
     said = f"{most} matters most: with the other parameters it has {100 * shares.total[most]:.0f} % of the variance."
-    tables = [shown.sobol_table(what, shares), *(shown.budget_table(b, tolerance) for b in budgets)]
+    tables = [jc.show.sobol_table(f"{what.capitalize()} of {name}", shares)]
+    tables += [jc.show.budget_table(budget, tolerance) for budget in budgets]
     notes = [shares.warning] if shares.warning else []
     if shares.scatter:
         notes.append(
-            f"Scatter of the motion itself is {100 * shares.scatter:.0f} % of the variance, in no parameter's own share."
+            f"Scatter of the motion is {100 * shares.scatter:.0f} % of the variance, in no parameter's own share."
         )
     notes += [f"Within twice the error, no effect: {', '.join(b.unclear)}" for b in budgets if b.unclear]
-    document |= {"designs": shares.evaluations, "doubtful": shares.doubtful, "scatter": shares.scatter}
-    return Answer(
-        said, tables, notes, document | {"budgets": [shown.budget_record(b) for b in budgets]}, subject, files
-    )
+    document = {"vary": bounds, "of": what, "tolerance_percent": tolerance, "designs": shares.evaluations}
+    document |= {"doubtful": shares.doubtful, "scatter": shares.scatter, "budgets": budgets}
+    return Answer(said, tables, notes, document, subject, files)
 
 
-def _budget(d: Any, slope: Any, names: Any, deviation: float) -> Any:
-    return d.tolerance_budget(slope, dict.fromkeys(names, deviation))
-
-
-def require_power(samples: int) -> None:
-    """**Raises:** `InputError` for a number of samples that is no power of 2."""
-    from .._errors import InputError
-
+def _power(samples: int) -> int:
+    """A number of samples. **Raises:** `InputError` for one that is no power of 2."""
     if samples < 2 or samples & (samples - 1):
         raise InputError(f"Option --samples must be a power of 2, but {samples} was given.")
+    return samples
 
 
 def unknowns(
     case: o.Case,
     *,
-    first: o.First = 2500.0,
-    last: o.Last = 27500.0,
-    speeds: o.FromOne = 8,
+    over: o.Range = o.Range(),
     samples: o.FromTwo = 16,
     seed: o.Seed = 0,
     steps: o.StepOptions = o.StepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """The measurement that would decide: shares of each range of a TOML file in the chaotic speeds.
+    """The measurement that would decide: shares of each range of a TOML file in the chaotic speeds, by default of 8.
 
     Args:
-        speeds: Speeds at which a draw is assessed.
         samples: Base samples of the Sobol indices, a power of 2.
     """
-    from .. import show as shown
-    from .._parameters import parameter_info
-    from ..design import chaotic_shares, sobol_of
-    from .subject import RPM, read_case
-
     subject = read_case(case)
     subject.require_ranges()
-    require_power(samples)
-    at, info = subject.range(first, last, speeds), parameter_info(subject.model)
+    at, info, labels = subject.range(over, 8), jc.parameter_info(subject.model), [u.label for u in subject.unknowns]
     with show.computing(f"unknowns {subject.name}") as say:
         told = {"method": steps.method, "progress": partial(say, "draws")}
-        share = partial(chaotic_shares, subject.model, subject.unknowns, at, **told)
-        found = sobol_of(share, [u.label for u in subject.unknowns], samples=samples, seed=seed)
+        share = partial(jc.design.chaotic_shares, subject.model, subject.unknowns, at, **told)
+        found = jc.design.sobol_of(share, labels, samples=_power(samples), seed=seed)
     sources = {u.label: info[u.names[0]].source for u in subject.unknowns}
-    most = max(found.total, key=lambda name: found.total[name])
+    most = max(found.total, key=found.total.__getitem__)
     said = f"Measure {most} first: {sources[most]}."
     if not any(found.total.values()):
         said = "Nothing to decide: every draw does the same."
     elif most in found.doubtful:
         said = "These draws do not tell what to measure first."
     document = {"designs": found.evaluations, "doubtful": found.doubtful, "speeds_rpm": at * RPM}
-    table = shown.sobol_table(f"Chaotic share of {subject.name}", found, sources)
     document["measure"] = {"what": most, "how": sources[most]}
+    table = jc.show.sobol_table(f"Chaotic share of {subject.name}", found, sources)
     return Answer(said, [table], [found.warning] if found.warning else [], document, subject.certain)
 
 
@@ -394,32 +301,28 @@ def identify(
         draws: Draws from the ranges, in each stage.
         stages: Times that the ranges close around the best draws, at most.
     """
-    from .. import show as shown
-    from .._parameters import parameter_info
-    from ..design import identify as narrow
-    from ..files import read_bytes, read_measurements, with_ranges
-    from .subject import read_case
-
     subject = read_case(case)
     subject.require_ranges()
-    rows, info = read_measurements(measured, subject.speeds, 1 / subject.shaft), parameter_info(subject.model)
+    rows, info = (
+        jc.files.read_measurements(measured, subject.speeds, 1 / (subject.shaft or 1.0)),
+        jc.parameter_info(subject.model),
+    )
     with show.computing(f"identify {subject.name}") as say:
         given = {"draws": draws, "stages": stages, "seed": seed, "method": steps.method}
-        found = narrow(subject.model, subject.unknowns, rows, **given, progress=partial(say, "draws"))
-    tables = [shown.measured_table(found, rows, subject.beside)]
+        found = jc.design.identify(subject.model, subject.unknowns, rows, **given, progress=partial(say, "draws"))
+    tables = [jc.show.measured_table(found, rows, subject.beside)]
     document = {name: getattr(found, name) for name in ("draws", "stages", "accepted")}
     if not found.met:
         worst = max(tables[0].records, key=lambda row: row["off_by_tolerances"])
-        why = f"None of {found.draws} draws does what was measured in all rows: the nearest is {worst['off_by_tolerances']:.2g} "
-        why += (
-            f"tolerances off in '{worst['what']}'. Widen ranges or tolerances, or look for what the model leaves out."
-        )
-        return Answer(
-            "No draw does what was measured.", tables, [], document | {"file": None}, subject.certain, failure=why
-        )
+        off = f"{worst['off_by_tolerances']:.2g} tolerances off in '{worst['what']}'"
+        why = f"None of {found.draws} draws does what was measured in all rows: the nearest is {off}."
+        why += " Widen ranges or tolerances, or look for what the model leaves out."
+        said, document = "No draw does what was measured.", document | {"file": None}
+        return Answer(said, tables, [], document, subject.certain, failure=why)
     units = {u.label: info[u.names[0]].unit for u in subject.unknowns}
     each = zip(found.unknowns, found.ranges, found.narrowed, strict=True)
-    text = with_ranges(read_bytes(case).decode(), {u.label: (r, units[u.label]) for u, r, worth in each if worth})
+    new = {u.label: (r, units[u.label]) for u, r, worth in each if worth}
+    text = jc.files.with_ranges(jc.files.read_bytes(case).decode(), new)
     said = f"{found.accepted} of {found.draws} draws of the last of {found.stages} stages do what was measured."
-    tables = [shown.narrowed_table(found, units), *tables]
-    return Answer(said, tables, [], document, dataclasses.replace(subject.certain), {"file": (".toml", text)})
+    tables.insert(0, jc.show.narrowed_table(found, units))
+    return Answer(said, tables, [], document, subject.certain, {"file": (".toml", text)})

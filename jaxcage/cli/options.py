@@ -6,24 +6,20 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 from tyro.conf import arg
 from tyro.constructors import PrimitiveConstructorSpec
 
+from .. import _errors
 from .progress import Say, progress
 
-
-if TYPE_CHECKING:
-    from ..solve import AbstractMethod
 
 MOST = 10_000_000
 """Largest count: more lanes, speeds or revolutions end in no memory, or in no lifetime."""
 LARGEST = {"rpm": 1e6, "N": 1e7}
 """Largest speed and load."""
-LONGEST = 200
-"""Bytes in the name of a store; file systems allow 255, and temporary names are longer."""
 SIDE = range(2, 10_001)
 """Points along one side of a map."""
 EXAMPLES = {"rpm": '"900 rad/s" or "20000 rpm shaft"', "N": '"4.45 kN"', "ms": '"600 us"'}
@@ -35,12 +31,13 @@ def flag(name: str) -> str:
 
 
 def _option(metavar: str, read: Callable[[str], Any]) -> Any:
+    shown = lambda x: "by the model" if x is None else f"{x:g}" if isinstance(x, float) else str(x)
     return PrimitiveConstructorSpec(
         nargs=1,
         metavar=metavar,
         instance_from_str=lambda given: read(given[0]),
         is_instance=lambda _: True,
-        str_from_instance=lambda x: ["by the model" if x is None else f"{x:g}" if isinstance(x, float) else str(x)],
+        str_from_instance=lambda x: [shown(x)],
     )
 
 
@@ -51,12 +48,12 @@ def read_quantity(text: str, unit: str) -> float:
     """
     with contextlib.suppress(ValueError):
         return float(text)
+    if not unit:
+        raise ValueError(f'must be a number, but is "{text}".')
     from ..files import SpeedOf, split_owner, to_si  # loads pint
 
     try:
-        if unit != "rpm":
-            return to_si(text, unit)
-        speed, whose = split_owner(text)
+        speed, whose = split_owner(text) if unit == "rpm" else (text, None)
         return to_si(speed, unit) if whose is None else SpeedOf(to_si(speed, unit), whose)
     except ValueError as error:
         example = EXAMPLES[unit]
@@ -67,10 +64,7 @@ def number(must: str = "be finite", holds: Callable[[float], bool] = math.isfini
     """An option that is a number, in `unit` or with a unit of its own, for which `holds` is true."""
 
     def read(text: str) -> float:
-        try:
-            value = read_quantity(text, unit) if unit else float(text)
-        except ValueError as error:
-            raise ValueError(str(error) if unit else f'must be a number, but is "{text}".') from None
+        value = read_quantity(text, unit)
         if not (math.isfinite(value) and holds(value)):
             raise ValueError(f"must {must}, but {value:g} was given.")
         if value > LARGEST.get(unit, math.inf):
@@ -80,17 +74,18 @@ def number(must: str = "be finite", holds: Callable[[float], bool] = math.isfini
     return _option({"": "FLOAT", "rpm": "RPM"}.get(unit, unit), read)
 
 
-def count(least: int, of: int = 1) -> Any:
-    """An option that is a whole number of at least `least`, and a multiple of `of`."""
+def count(least: int) -> Any:
+    """An option that is a whole number of at least `least`."""
 
     def read(text: str) -> int:
         try:
             value = int(text)
         except ValueError:
             raise ValueError(f'must be an integer, but is "{text}".') from None
-        if value < least or value % of or value > MOST:
-            allowed = f"a multiple of {of} above 0" if of > 1 else f"at least {least}"
-            raise ValueError(f"must be {f'at most {MOST}' if value > MOST else allowed}, but {value} was given.")
+        if not least <= value <= MOST:
+            raise ValueError(
+                f"must be at {f'most {MOST}' if value > MOST else f'least {least}'}, but {value} was given."
+            )
         return value
 
     return _option("INT", read)
@@ -101,7 +96,7 @@ def pair(sign: str, what: str, holds: Callable[[int, int], bool]) -> Any:
 
     def read(text: str) -> tuple[int, int]:
         with contextlib.suppress(ValueError):
-            first, second = map(int, text.lower().replace("×", "x").split(sign))
+            first, second = map(int, text.lower().split(sign))
             if holds(first, second):
                 return first, second
         raise ValueError(f"must be {what}, but '{text}' was given.")
@@ -123,42 +118,47 @@ def text(must: str = "hold a text", holds: Callable[[str], bool] = bool) -> Any:
 def is_within(path: str) -> bool:
     """True if a path leads to a place within the folder that it starts from, by names that a disk takes."""
     parts = Path(path).parts
-    short = all(len(os.fsencode(part)) <= LONGEST for part in parts)
+    short = all(len(os.fsencode(part)) <= 200 for part in parts)  # temporary names are longer
     return bool(parts) and short and not Path(path).is_absolute() and ".." not in parts
 
 
 _SPEED = number("be a speed above 0 rpm", lambda x: x > 0, "rpm")
-_LOAD = number("be above 0 N", lambda x: x > 0, "N")
-_OWN = "Bare numbers are the cage's [rpm], of a bearing or as a file says the shaft's"
+_OWN = "Bare numbers are the cage's [rpm], of a bearing with its rollers, or where a file says so, the shaft's"
+_SIDES = f"ACROSSxUPWARDS, each from {SIDE[0]} to {SIDE[-1]}, e.g. 300x300"
+_CASE = "A published case (1a, 1b, 2a, 2b, 3a, 3b), a bearing with its rollers (nu2310), or a TOML file."
 
-Case = Annotated[
-    tyro.conf.Positional[str],
-    arg(metavar="CASE", help="A published case (1a, 1b, 2a, 2b, 3a, 3b), a bearing (nu2310), or a TOML file."),
-]
-First = Annotated[float, _SPEED, arg(help=f'Lowest speed, e.g. "300 rad/s" or "6000 rpm shaft". {_OWN}.')]
-Last = Annotated[float, _SPEED, arg(help="Highest speed.")]
+Case = Annotated[tyro.conf.Positional[str], arg(metavar="CASE", help=_CASE)]
 Speed = Annotated[float, _SPEED, arg(help=f'Speed, e.g. "900 rad/s" or "20000 rpm shaft". {_OWN}.')]
-OptionalSpeed = Annotated[float | None, _SPEED, arg(help="One speed, where the model or the map needs one.")]
-Load = Annotated[float | None, _LOAD, arg(help='Shaft load of a bearing with its rollers [N], e.g. "4.45 kN".')]
-Count = Annotated[int | None, count(1), arg(help="Number of speeds.")]
+OptionalSpeed = Annotated[float | None, _SPEED, arg(help="The speed, where one is needed.")]
+Load = Annotated[
+    float | None,
+    number("be above 0 N", lambda x: x > 0, "N"),
+    arg(help='Shaft load of a bearing with its rollers [N], e.g. "4.45 kN".'),
+]
+Draws = Annotated[int, count(0), arg(help="Draws from ranges of the file; 0 takes the best guesses.")]
 Seed = Annotated[int, count(0), arg(help="Seed of all that is drawn.")]
 Quick = Annotated[bool, arg(help="Leave out what takes long, such as gradients.")]
-Revolutions = Annotated[int | None, count(1), arg(help="Revolutions observed.")]
-Discard = Annotated[int | None, count(0), arg(help="Revolutions left out at the beginning.")]
-FromZero = Annotated[int, count(0)]
-FromOne = Annotated[int, count(1)]
+FromZero, FromOne = Annotated[int, count(0)], Annotated[int, count(1)]
 FromTwo = Annotated[int, count(2)]
 OptionalCount = Annotated[int | None, count(1)]
-OptionalTwo = Annotated[int | None, count(2), arg(help="Number of speeds that are simulated.")]
+OptionalZero = Annotated[int | None, count(0)]
 OptionalText = Annotated[str | None, text()]
 Price = Annotated[float | None, number("be at least 0", lambda x: x >= 0)]
 Texts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
-Points = Annotated[
-    tuple[int, int] | None,
-    pair("x", f"ACROSSxUPWARDS, each from {SIDE[0]} to {SIDE[-1]}, e.g. 300x300", lambda a, b: a in SIDE and b in SIDE),
-]
+Points = Annotated[tuple[int, int] | None, pair("x", _SIDES, lambda a, b: a in SIDE and b in SIDE)]
 Shard = Annotated[tuple[int, int], pair("/", "I/N with I from 1 to N, e.g. 1/4", lambda i, n: 1 <= i <= n)]
-Store = Annotated[str | None, text("name a folder within --out", is_within)]
+
+
+@dataclasses.dataclass(frozen=True)
+class Range:
+    """Range of speed."""
+
+    first: Annotated[float, _SPEED] = 2500.0
+    """Lowest speed, e.g. "300 rad/s" or "6000 rpm shaft"; bare numbers as in the description of CASE."""
+    last: Annotated[float, _SPEED] = 27500.0
+    """Highest speed."""
+    count: OptionalCount = None
+    """Number of speeds."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -173,39 +173,39 @@ class StepOptions:
     """Adaptive steps with this tolerance."""
 
     @property
-    def method(self) -> "AbstractMethod | None":
+    def method(self) -> Any:
         """The integration method that is asked for; None leaves the choice to what is computed."""
-        if self.solver is None and self.steps is None and self.tolerance is None:
+        given = {"solver": self.solver, "steps": self.steps, "tolerance": self.tolerance}
+        given = {name: value for name, value in given.items() if value is not None}
+        if not given:
             return None
         from ..solve import method, native
 
-        if self.solver is None and self.steps is None:
-            return native(tolerance=self.tolerance)
-        named = {} if self.solver is None else {"solver": self.solver}
-        return method(**named, steps=self.steps, tolerance=self.tolerance)
+        return native(**given) if list(given) == ["tolerance"] else method(**given)
 
 
 @dataclasses.dataclass(frozen=True)
 class RunOptions(StepOptions):
     """How long to run."""
 
-    discard: Discard = None
-    revolutions: Revolutions = None
+    discard: OptionalZero = None
+    """Revolutions left out at the beginning."""
+    revolutions: OptionalCount = None
+    """Revolutions observed."""
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Settings of `jaxcage.lanes.Run`; what was not given is None, and the model's own default."""
+        """Settings of `jaxcage.lanes.Run` that are given; the model has defaults of its own for the others."""
         found = {"discard": self.discard, "revolutions": self.revolutions, "method": self.method}
-        if self.revolutions is not None:
-            found["blocks"] = blocks_of(self.revolutions)
-        return found
+        found["blocks"] = None if self.revolutions is None else blocks_of(self.revolutions)
+        return {name: value for name, value in found.items() if value is not None}
 
 
 @dataclasses.dataclass(frozen=True)
 class SweepOptions(RunOptions):
-    """How long to run, and how sure labels are to be."""
+    """How long to run, and how certain labels are to be."""
 
-    horizon: Annotated[int | None, count(0)] = None
+    horizon: OptionalZero = None
     """Revolutions to which chaos is followed, to tell how long it lasts; 0 turns this off."""
     no_confirm: bool = False
     """Do not run lanes that are not periodic again by finer steps."""
@@ -214,25 +214,27 @@ class SweepOptions(RunOptions):
 
     @property
     def settings(self) -> dict[str, Any]:
-        confirm = False if self.no_confirm else None
-        return super().settings | {"horizon": self.horizon, "confirm": confirm, "exponents": self.exponents}
+        found = {"horizon": self.horizon, "exponents": self.exponents, "confirm": False if self.no_confirm else None}
+        return super().settings | {name: value for name, value in found.items() if value is not None}
 
 
-def blocks_of(revolutions: int) -> int:
-    """Number of equal blocks of the observed revolutions, from which error bars come.
+@dataclasses.dataclass(frozen=True)
+class MeanOptions:
+    """Runs at one speed, of a bearing with its rollers."""
 
-    **Raises:** `ValueError` for revolutions that cannot be cut.
-    """
-    if revolutions % 10 == 0:
-        return 10 if revolutions % 20 else 20
-    found = max(n for n in range(1, 21) if revolutions % n == 0)
-    if found == 1:
-        from .._errors import InputError
+    speed: OptionalSpeed = None
+    """The speed, e.g. "10000 rpm shaft"."""
+    load: Load = None
+    starts: OptionalCount = None
+    """Initial states of each design."""
+    discard: OptionalZero = None
+    """Revolutions left out at the beginning."""
+    revolutions: OptionalCount = None
+    """Revolutions observed, an even number."""
 
-        raise InputError(
-            f"Option --revolutions must be a multiple of 10, or of another number up to 20, but {revolutions} was given."
-        )
-    return found
+    def length(self, **usual: int) -> dict[str, int]:
+        """Initial states and revolutions as given, or else the usual ones."""
+        return {n: x if getattr(self, n) is None else getattr(self, n) for n, x in usual.items()}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -259,3 +261,16 @@ class ShowOptions:
         check_writable(self.out)
         with progress(what, advice) as say:
             yield say
+
+
+def blocks_of(revolutions: int) -> int:
+    """Number of equal blocks of the observed revolutions, from which error bars come.
+
+    **Raises:** `ValueError` for revolutions that cannot be cut.
+    """
+    if revolutions % 10 == 0:
+        return 10 if revolutions % 20 else 20
+    if (found := max(n for n in range(1, 21) if revolutions % n == 0)) == 1:
+        said = f"must be a multiple of 10, or of another number up to 20, but {revolutions} was given."
+        raise _errors.ArgumentError("revolutions", said=said)
+    return found

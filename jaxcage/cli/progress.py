@@ -11,8 +11,6 @@ from types import FrameType
 from typing import Any, TypeAlias
 
 
-OK, FAILED, BAD_INPUT = 0, 1, 2
-"""Exit statuses."""
 FILES_ARE_WHOLE = "files of earlier runs are as they were, and the same command starts over"
 SECONDS_BETWEEN_LINES = 60.0
 ENDS = (signal.SIGINT, signal.SIGTERM)
@@ -38,18 +36,17 @@ def visible(text: str) -> str:
 
 def shorten_cache_warnings() -> None:
     """Make one sentence of all that Python and JAX warn of compiled programs that cannot be stored or used."""
-    shown, told = warnings.showwarning, []
+    shown, told = warnings.showwarning, set()
 
     def show(message: Warning | str, *where: Any, **more: Any) -> None:
         text = str(message)
-        if text.startswith("Compiled programs are not kept"):
+        if "persistent compilation cache" in text:
+            text = "a stored compiled program cannot be used, or not be stored: it is compiled anew."
+        elif not text.startswith("Compiled programs are not kept"):
+            return shown(message, *where, **more)
+        if text not in told:
             say(f"Warning: {text}")
-        elif "persistent compilation cache" in text:
-            if not told:
-                say("Warning: a stored compiled program cannot be used, or not be stored: it is compiled anew.")
-            told.append(text)
-        else:
-            shown(message, *where, **more)
+        told.add(text)
 
     if getattr(shown, "__name__", "") != show.__name__:
         warnings.showwarning = show
@@ -91,11 +88,8 @@ def progress(text: str, advice: str = "") -> Iterator[Say]:
     global _advice
     _advice = advice or FILES_ARE_WHOLE
     try:
-        if sys.stderr.isatty():
-            with _bar(text) as bar:
-                yield bar
-        else:
-            yield _line_a_minute(text)
+        with _bar(text) if sys.stderr.isatty() else contextlib.nullcontext(_line_a_minute(text)) as report:
+            yield report
     finally:
         _advice = None
 

@@ -4,19 +4,20 @@ import dataclasses
 import math
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Float
+
+import jaxcage as jc
 
 from .._errors import InputError
-from .._parameters import readings_of, replace
-from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
-from ..files import BearingFile, Unknown, Whose, read_bearing, read_whole_bearing, subject_of
-from ..models import FASTEST, WHOLE_BEARINGS, case, whole_bearing
-from .options import flag
+from .options import Range, flag
 from .progress import say
 
+
+if TYPE_CHECKING:
+    from ..bearing import PublishedCase
+    from ..files import BearingFile, Unknown
 
 RPM = 30 / math.pi
 
@@ -28,8 +29,8 @@ class Subject:
     name: str
     """Name of the case, or of the TOML file without its ending and with `_` for characters that no figure can show."""
     model: Any
-    published: PublishedCase | None = None
-    file: BearingFile | None = None
+    published: "PublishedCase | None" = None
+    file: "BearingFile | None" = None
 
     @property
     def own(self) -> str:
@@ -37,23 +38,23 @@ class Subject:
         return self.model.speed_text.split()[0]
 
     @property
-    def speeds(self) -> Whose | str:
+    def speeds(self) -> Any:
         """Whose speeds bare numbers are."""
         return self.own if self.file is None else self.file.speeds
 
     @property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def unknowns(self) -> "tuple[Unknown, ...]":
         """Values of which the file knows a range only."""
         return () if self.file is None else self.file.unknowns
 
     @property
-    def reports_means(self) -> bool:
-        """True for a model that reports quantities of its own, each revolution of which takes long."""
-        return bool(self.model.quantities)
+    def with_rollers(self) -> bool:
+        """True for a bearing with its rollers, whose motion does not repeat and which reports means of it."""
+        return self.model.samples > 1
 
-    def usual(self, forced: Any, with_rollers: Any) -> Any:
-        """One of two defaults: of a forced system, or of a model that reports quantities of its own."""
-        return with_rollers if self.reports_means else forced
+    def usual(self, cage: Any, bearing: Any) -> Any:
+        """One of two defaults: of a cage, or of a bearing with its rollers."""
+        return bearing if self.with_rollers else cage
 
     def _other(self, speed: Any) -> Any:
         """The speed that goes with the model's, both in rpm."""
@@ -68,12 +69,6 @@ class Subject:
     def beside(self) -> tuple[str, float] | None:
         """The speed that tables show beside the model's, and its ratio to it."""
         return None if self.shaft is None else ("shaft", self.shaft)
-
-    @property
-    def design_words(self) -> str:
-        """Gap and eccentricity, for titles."""
-        gap, eccentricity = 1e3 * float(self.model.guidance_gap), 1e6 * float(self.model.eccentricity)
-        return f"guidance gap {gap:.3g} mm, eccentricity {eccentricity:.3g} µm"
 
     def both(self, speed: Any) -> dict[str, Any]:
         """Speeds of the model [rad/s] as speeds of cage and shaft [rpm], for a document."""
@@ -91,11 +86,13 @@ class Subject:
         slope = 1.0 if self.speeds == self.own else float(self._other(1.0) - self._other(0.0))
         return given / slope / RPM
 
-    def speed(self, given: float, option: str = "speed") -> float:
+    def speed(self, given: float | None, option: str = "speed") -> float:
         """The speed of the model [rad/s] that an option means, by the model's own relation of cage and shaft.
 
-        **Raises:** `InputError` for a speed at which no cage runs.
+        **Raises:** `InputError` for no speed, and for one at which no cage runs.
         """
+        if given is None:
+            raise InputError(f'Option {flag(option)} must be given, e.g. {flag(option)} "10000 rpm shaft".')
         speed = float(given)
         if getattr(given, "whose", self.speeds) != self.own:
             at_rest = float(self._other(0.0))
@@ -105,66 +102,51 @@ class Subject:
                     f"Option {flag(option)} must be above {at_rest:g} rpm of the cage, which the outer ring makes by "
                     f"itself, but {float(given):g} rpm was given."
                 )
-        cage = speed if self.own == "cage" else float(self._other(speed))
-        limit = FASTEST / float(self.model.land_radius) * RPM
-        if abs(cage) > limit:
+        cage = speed if self.own == "cage" else abs(float(self._other(speed)))
+        limit = jc.models.FASTEST / float(self.model.land_radius) * RPM
+        if not 0 < speed or not cage <= limit:
             raise InputError(
-                f"Option {flag(option)} must leave the cage at most {limit:.0f} rpm, which is {FASTEST:g} m/s at its "
-                f'land, but {cage:g} rpm of the cage were given; speeds of the shaft are written "20000 rpm shaft".'
+                f"Option {flag(option)} must be above 0 and leave the cage at most {limit:.0f} rpm, which is "
+                f"{jc.models.FASTEST:g} m/s at its land, but {cage:g} rpm of the cage were given; speeds of the shaft "
+                'are written "20000 rpm shaft".'
             )
         return speed / RPM
 
-    def range(self, first: float, last: float, count: int) -> Float[np.ndarray, " count"]:
-        """Evenly spaced speeds of the model [rad/s]; of one only the first.
+    def range(self, over: Range, count: int) -> Any:
+        """Evenly spaced speeds of the model [rad/s], `count` if none are asked for; of one only the first.
 
         **Raises:** `InputError` for a range that does not ascend.
         """
-        low, high = self.speed(first, "first"), self.speed(last, "last")
+        low, high = self.speed(over.first, "first"), self.speed(over.last, "last")
+        count = over.count or count
         if count > 1 and high <= low:
-            raise InputError(
-                f"Option --last must be above --first, but the range is {low * RPM:g} to {high * RPM:g} rpm of the "
-                f"{self.own}."
-            )
+            between = f"{low * RPM:g} to {high * RPM:g} rpm of the {self.own}"
+            raise InputError(f"Option --last must be above --first, but the range is {between}.")
         return np.linspace(low, high, count) if count > 1 else np.array([low])
-
-    def loaded(self, load: float | None) -> "Subject":
-        """The model under the shaft load of an option [N].
-
-        **Raises:** `InputError` for a cage, whose forces do not follow from it.
-        """
-        if load is None:
-            return self
-        if not self.reports_means:
-            raise InputError(f"Option --load goes with a bearing with its rollers, but {self.name} is a cage.")
-        return dataclasses.replace(self, model=replace(self.model, load=load))
 
     def require_orbits(self, command: str) -> None:
         """**Raises:** `InputError` for a model whose revolutions do not repeat."""
-        if self.model.samples > 1:
+        if self.with_rollers:
             raise InputError(f"Command {command} takes a cage, but {self.name} is a bearing with its rollers.")
 
     def require_ranges(self) -> None:
         """**Raises:** `InputError` for a model that is known exactly."""
         if not self.unknowns:
-            raise InputError(
-                f'Case {self.name} must be a TOML file with ranges, such as stiffness = "1e4 .. 1e6 N/m", but has none.'
-            )
+            example = 'such as stiffness = "1e4 .. 1e6 N/m"'
+            raise InputError(f"Case {self.name} must be a TOML file with ranges, {example}, but has none.")
 
     @property
     def certain(self) -> "Subject":
         """The same without ranges, for answers that have taken them into account."""
-        return (
-            self if self.file is None else dataclasses.replace(self, file=dataclasses.replace(self.file, unknowns=()))
-        )
+        return dataclasses.replace(self, file=self.file and dataclasses.replace(self.file, unknowns=()))
 
     @property
     def document(self) -> dict[str, Any]:
         """What every document says of the case."""
-        found: dict[str, Any] = {"readings": {name: chosen for name, (chosen, _) in readings_of(self.model).items()}}
-        if self.shaft is not None:
-            found["cage_speed_ratio"] = 1 / self.shaft
-        if self.reports_means:
-            found["load_N"] = float(self.model.load)
+        readings = jc._parameters.readings_of(self.model).items()
+        found: dict[str, Any] = {"readings": {name: chosen for name, (chosen, _) in readings}}
+        found |= {} if self.shaft is None else {"cage_speed_ratio": 1 / self.shaft}
+        found |= {"load_N": float(self.model.load)} if self.with_rollers else {}
         if self.file is not None:
             found |= {"left_as_in_template": self.file.left, "best_guesses": [u.label for u in self.unknowns]}
         return found
@@ -172,11 +154,11 @@ class Subject:
     @property
     def notes(self) -> list[str]:
         """The same in sentences."""
-        words, readings = self.document, readings_of(self.model).items()
+        said, readings = self.document, jc._parameters.readings_of(self.model).items()
         each = {
             "Readings": [f'{name.replace("_", " ")} {words} ("{chosen}")' for name, (chosen, words) in readings],
-            "As the template has them, of another bearing": words.get("left_as_in_template"),
-            "Best guesses of values known within ranges only": words.get("best_guesses"),
+            "As the template has them, of another bearing": said.get("left_as_in_template"),
+            "Best guesses of values known within ranges only": said.get("best_guesses"),
         }
         return [f"{what}: {', '.join(values)}" for what, values in each.items() if values]
 
@@ -186,21 +168,24 @@ def read_case(given: str, load: float | None = None) -> Subject:
 
     A broken design rule and an oil that is too thin are reported on standard error.
 
-    **Raises:** `InputError`.
+    **Raises:** `InputError`, also for the load of a cage, whose forces do not follow from it.
     """
-    if given in PUBLISHED_CASES:
-        found = Subject(given, case(given), PUBLISHED_CASES[given])
+    cases, bearings = jc.bearing.PUBLISHED_CASES, jc.models.WHOLE_BEARINGS
+    if given in cases:
+        found = Subject(given, jc.case(given), cases[given])
     elif Path(given).suffix.lower() == ".toml" or os.path.exists(given):
-        file = read_bearing(given) if subject_of(given) == "cage" else read_whole_bearing(given)
-        name = "".join(c if c.isprintable() and c != "$" else "_" for c in Path(given).stem)
+        read = jc.files.read_bearing if jc.files.subject_of(given) == "cage" else jc.files.read_whole_bearing
+        file, name = read(given), "".join(c if c.isprintable() and c != "$" else "_" for c in Path(given).stem)
         found = Subject(name, file.model, None, file)
-    elif given.lower() in WHOLE_BEARINGS:
-        found = Subject(given.lower(), whole_bearing(given))
+    elif given.lower() in bearings:
+        found = Subject(given.lower(), jc.whole_bearing(given))
     else:
-        known = ", ".join([*PUBLISHED_CASES, *WHOLE_BEARINGS])
+        known = ", ".join([*cases, *bearings])
         raise InputError(f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file.")
-    if broken := design_rule_violations(found.model.bearing, found.model.guidance_gap):
+    if broken := jc.bearing.design_rule_violations(found.model.bearing, found.model.guidance_gap):
         say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
     for doubt in found.model.lubricant.doubts():
         say(f"Warning: {doubt}")
-    return found.loaded(load)
+    if load is not None and not found.with_rollers:
+        raise InputError(f"Option --load goes with a bearing with its rollers, but {found.name} is a cage.")
+    return found if load is None else dataclasses.replace(found, model=jc.replace(found.model, load=load))

@@ -17,14 +17,11 @@ from typing import Any
 from .. import __version__
 from .._cache import keep_compiled_programs
 from .._errors import ArgumentError, InputError, NoResult
-from . import case_commands, design_commands, orbit_commands, speed_commands
+from . import case_commands as case, design_commands as design, orbit_commands as orbit, speed_commands as speed
 from .answer import Answer, complete, print_answer
 from .options import ShowOptions, flag
 from .progress import (
-    BAD_INPUT,
-    FAILED,
     FILES_ARE_WHOLE,
-    OK,
     end_at_once_when_interrupted,
     interrupted_status,
     say,
@@ -32,41 +29,18 @@ from .progress import (
 )
 
 
-COMMANDS: dict[str, Callable[..., Answer]] = {
-    "init": case_commands.init,
-    "simulate": speed_commands.simulate,
-    "sweep": speed_commands.sweep,
-    "zones": orbit_commands.zones,
-    "bifurcations": orbit_commands.bifurcations,
-    "gradient": orbit_commands.gradient,
-    "compare": speed_commands.compare,
-    "runup": speed_commands.runup,
-    "map": orbit_commands.map_,
-    "study": speed_commands.study,
-    "design": design_commands.design,
-    "sensitivity": design_commands.sensitivity,
-    "unknowns": design_commands.unknowns,
-    "identify": design_commands.identify,
-    "poincare": speed_commands.poincare,
-    "statics": case_commands.statics,
-    "impact": case_commands.impact,
-    "reproduce": case_commands.reproduce,
-    "report": case_commands.report,
-}
+OK, FAILED, BAD_INPUT = 0, 1, 2
+"""Exit statuses."""
+FUNCTIONS: tuple[Callable[..., Answer], ...] = (
+    *(case.init, speed.simulate, speed.sweep, orbit.zones, orbit.bifurcations, orbit.gradient, speed.compare),
+    *(speed.runup, orbit.map_, speed.study, design.design, design.sensitivity, design.unknowns, design.identify),
+    *(speed.poincare, case.statics, case.impact, case.reproduce, case.report),
+)
+COMMANDS = {function.__name__.rstrip("_"): function for function in FUNCTIONS}
 COMPLETION, SHELLS = ("--tyro-print-completion", "--tyro-write-completion"), ("bash", "zsh", "tcsh", "fish")
 """Options that tyro takes by itself, and the values that it asserts."""
-CALLED = {
-    "directions": "by",
-    "lanes": "chunk",
-    "samples": "sample",
-    "operating": "at",
-    "settle": "discard",
-    "centrifugal_force": "shaft_speed",
-    "confirm": "no_confirm",
-    "blocks": "revolutions",
-    "x": "points",
-    "y": "points",
-}
+CALLED = {"directions": "by", "lanes": "chunk", "samples": "sample", "settle": "discard", "confirm": "no_confirm"}
+CALLED |= {"centrifugal_force": "shaft_speed", "blocks": "revolutions", "x": "points", "y": "points"}
 """Argument of the library -> option that it comes from, where no option has its name."""
 
 
@@ -77,7 +51,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     interrupted, 143 when told to end.
     """
     if arguments is None:  # the process is ours, not a notebook's
-        _open_what_is_closed()
+        for name in ("stdout", "stderr"):  # one that was started without them writes to the null device
+            if getattr(sys, name) is None:
+                setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
         end_at_once_when_interrupted()
         gc.set_threshold(200_000, 50, 100)  # looking for dead objects takes a tenth of the time otherwise
     try:
@@ -99,13 +75,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return interrupted_status()
 
 
-def _open_what_is_closed() -> None:
-    """A process that was started without standard output or error writes to the null device."""
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:
-            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
-
-
 def _run(call: functools.partial[Answer]) -> None:
     """Run a command, write its files, and print its answer."""
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA writes pages about each program that it finds compiled
@@ -122,8 +91,7 @@ def _run(call: functools.partial[Answer]) -> None:
     began = time.perf_counter()
     try:
         answer = call()
-        name = next(name for name, command in COMMANDS.items() if command is call.func)
-        answer = complete(answer, name, show, time.perf_counter() - began)
+        answer = complete(answer, call.func.__name__.rstrip("_"), show, time.perf_counter() - began)
     except ArgumentError as error:
         raise _about_options(error, call) from error
     except jax.errors.JaxRuntimeError as error:

@@ -258,7 +258,7 @@ def _build_chosen(
     table = dict(table)
     kind = options[0]
     if len(options) > 1:
-        names = [law.kind for law in options]
+        names = [getattr(law, "kind", "") for law in options]
         given = table.pop("kind", getattr(start, "kind", None))
         if given not in names:
             given = "missing" if given is None else shown(given)

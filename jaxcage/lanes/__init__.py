@@ -27,7 +27,7 @@ from .dataset import (
     versions as versions,
 )
 from .grid import OIL as OIL, Grid as Grid, with_values as with_values
-from .observe import Progress as Progress
+from .observe import Progress as Progress, start_tangents as start_tangents
 from .plan import Plan as Plan, Speeds as Speeds, States as States, initial_states as initial_states, rpm as rpm
 from .ramps import (
     apart as apart,

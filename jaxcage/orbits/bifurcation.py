@@ -169,9 +169,9 @@ def bifurcation(
 class _Begin(NamedTuple):
     """Where Newton's method for a point begins: state [SI], speed [rad/s], value of the parameter [SI]."""
 
-    state: Array
-    speed: Array
-    at: Array
+    state: Any
+    speed: Any
+    at: Any
 
 
 def _along_branch(

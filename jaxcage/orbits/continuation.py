@@ -104,7 +104,8 @@ class ContinuationProblem(eqx.Module):
 
     def inside(self, u: np.ndarray) -> bool:
         """Return whether the parameters of a point are within the range."""
-        return bool(np.all((self.lower < self.values(u)) & (self.values(u) < self.upper)))
+        values = self.values(u)
+        return bool(np.all((self.lower < values) & (values < self.upper)))
 
     def require_inside(self, name: str, at: float) -> None:
         """**Raises:** `ArgumentError` for a first point outside the range of the first parameter."""
@@ -308,6 +309,8 @@ class Continuation:
         leaves = lambda curve: "" if self.problem.inside(curve.points[-1].u) else "range"
         counts = lambda curve: "steps" if len(curve.points) > control.most else ""
         self.events = (leaves, *events, closes, counts)
+        self.chooses = problem.counts.chooses
+        self.least, self.most = int(problem.counts.first), int(problem.counts.last)
         self.curves = [
             Path([start.take(i)], control.first, int(start.steps[i]), i, "" if start.converged[i] else "stuck")
             for i in range(len(start.u))
@@ -333,9 +336,8 @@ class Continuation:
         steps, lengths = (np.array([getattr(c, name) for c in active]) for name in ("steps", "length"))
         closely = np.clip(OF_A_STEP * lengths, 2 * TOLERANCE, FOLLOWING)
         got = self.corrector(self.problem, ahead, normal, steps, closely, measured=True)
-        counts = self.problem.counts
         unknown = np.flatnonzero(
-            counts.chooses & got.converged & (steps >= int(counts.last)) & ~(got.error <= SETTLED)
+            self.chooses & got.converged & (steps >= self.most) & ~(got.error <= SETTLED)
         )  # because of the steps, or of Newton's last step
         if unknown.size:
             closer = self.corrector(self.problem, got.u[unknown], normal[unknown], steps[unknown], measured=True)
@@ -346,10 +348,10 @@ class Continuation:
 
     def _advances(self, curve: Path, new: Points, ahead: np.ndarray, normal: np.ndarray, unknown: bool) -> bool:
         """Accept a new point or refuse it, and choose the next step."""
-        control, counts, length = self.control, self.problem.counts, curve.length
+        control, length = self.control, curve.length
         step = control.compare(curve.points, new, ahead, normal, length)
         same = step.same or not self.oriented
-        finer = counts.chooses and curve.steps < int(counts.last)
+        finer = self.chooses and curve.steps < self.most
         excess = max(new.excess / LOOSE, new.moved / (MOVED * length))
         if finer and new.converged and excess > 1:
             curve.steps *= 2
@@ -375,7 +377,7 @@ class Continuation:
             return False
         curve.points.append(new)
         curve.crosses &= same
-        if counts.chooses and curve.steps > int(counts.first) and excess < 1 / COARSER:
+        if self.chooses and curve.steps > self.least and excess < 1 / COARSER:
             curve.steps //= 2
         curve.length = control.after_success(length, step)
         curve.ended = next(filter(None, (event(curve) for event in self.events)), "")

@@ -117,7 +117,9 @@ def curve(
     genuine = np.array([point.kind != "Neimark-Sacker" or _is_on_circle(mu) for mu in multipliers])
     ended, error = (down.ended, up.ended), points.error * problem.units[0]
     states = problem.states(points.u)
-    return Curve(point.kind, x, y, *values.T, states, multipliers, genuine, ended, name, points.steps, error)
+    return Curve(
+        point.kind, x, y, values[:, 0], values[:, 1], states, multipliers, genuine, ended, name, points.steps, error
+    )
 
 
 def _is_on_circle(multipliers: np.ndarray) -> bool:

@@ -167,15 +167,15 @@ def _located(system: AbstractForcedSystem, point: Point, method: AbstractMethod 
 def _polished(problem: OrbitProblem, given: Given, kind: Any, first: Array) -> _Edge:
     """Locate the edge near the unknowns `first` by Newton's method, with the steps of the problem."""
     u, orbit = first, OrbitEquations(problem)
-    for i in range(ITERATIONS + 1):
+    left = ITERATIONS
+    while True:
         numbers = numbers_around(orbit, u, given)
         step, weight, rate = _unfold(kind, problem, u, numbers, *expansion(problem, u, numbers))
         leads = jnp.max(jnp.abs(u - step - first))
         goes_on = (jnp.max(jnp.abs(step)) > POLISHED) & (leads < NEARBY)  # not if it is there, lost, or not a number
-        if i == ITERATIONS or not bool(goes_on):
-            break
-        u = u - step
-    return _Edge(problem, u, step, weight, float(rate))
+        if not (left and bool(goes_on)):
+            return _Edge(problem, u, step, weight, float(rate))
+        u, left = u - step, left - 1
 
 
 def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None = None) -> float:

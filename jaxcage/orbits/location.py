@@ -154,7 +154,7 @@ def _parted(problem: ContinuationProblem, row: Points, places: Sequence[Place]) 
     pairs = np.flatnonzero([a.after == b.after and far(a, b) for a, b in itertools.pairwise(places)])
     if not pairs.size:
         return row, places
-    points = Points.stacked([p.point for p in places])
+    points = Points.stacked([p.point for p in places if p.point is not None])
     after = np.array([places[k].after for k in pairs])
     row, good = _with_middles(problem, row, after, points.take(pairs), points.take(pairs + 1))
     shifted = [p.after + int(np.sum(pairs[good] < k)) for k, p in enumerate(places)]
@@ -274,7 +274,7 @@ def _locate(problem: ContinuationProblem, places: Sequence[Place]) -> None:
     for p in there:
         p.steps = other_steps(p.steps)
     for p, point in zip(there, _found_at(problem, there), strict=True):
-        if point is not None:
+        if point is not None and p.point is not None:
             least = LOCATED if p.kind == "branch-point" else 0.0
             p.error = max(p.error, BY_OTHERS * abs(point.u[-1] - p.point.u[-1]), least)
         elif p.kind != "branch-point":

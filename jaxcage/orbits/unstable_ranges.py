@@ -97,7 +97,7 @@ def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -
     **Arguments:** result of `synchronous_orbits`; width below which windows and stretches are closed [rpm], by default
     500 rpm and at most 5 % of the highest speed. Without any stretch nothing is known of the orbit, and there is none.
     """
-    close_below_rpm = closing_width(found.sweep.rpm) if close_below_rpm is None else close_below_rpm
+    close_below_rpm = closing_width(found.sweep["rpm"].values) if close_below_rpm is None else close_below_rpm
     if not found.stretches:
         return LossZones((), {}, {}, None, close_below_rpm)
     principal = max(found.stretches, key=lambda s: (s.met_first, s.met, s.width_rpm))

@@ -47,7 +47,9 @@ from .chance_tables import (
 )
 from .columns import (
     branch_columns as branch_columns,
+    curve_columns as curve_columns,
     read_columns as read_columns,
+    roller_columns as roller_columns,
     strobe_columns as strobe_columns,
     trajectory_columns as trajectory_columns,
     write_columns as write_columns,
@@ -64,8 +66,8 @@ from .design_tables import (
     before_and_after_table as before_and_after_table,
     budget_record as budget_record,
     budget_table as budget_table,
+    changed_table as changed_table,
     optima_table as optima_table,
-    parameters_table as parameters_table,
     sobol_table as sobol_table,
 )
 from .diagrams import (

@@ -14,7 +14,9 @@ from ..solve import Trajectory
 
 
 if TYPE_CHECKING:
-    from ..orbits import Branch
+    from ..analysis.rollers import RollerHistory
+    from ..orbits import Branch, Curve
+    from .parameter_axes import Axis
 
 
 LARGEST_TABLE = 4_000_000_000
@@ -77,3 +79,22 @@ def branch_columns(branches: Sequence["Branch"]) -> dict[str, Shaped[np.ndarray,
         columns[f"multiplier {k + 1} (real part)"] = joined(np.real(b.multipliers[:, k]) for b in branches)
         columns[f"multiplier {k + 1} (imaginary part)"] = joined(np.imag(b.multipliers[:, k]) for b in branches)
     return columns
+
+
+def roller_columns(history: "RollerHistory") -> dict[str, Shaped[np.ndarray, " samples"]]:
+    """Time history of a bearing: cage, land, and each roller."""
+    columns = {"time [s]": history.time, "cage angle [rad]": history.angle}
+    columns |= {f"cage place {axis} over clearance": history.place[:, i] for i, axis in enumerate("xy")}
+    for name in ("pocket_on_cage", "land_on_cage"):
+        columns |= {f"{name}_{axis} [N]": getattr(history, name)[:, i] for i, axis in enumerate("xy")}
+    for name, unit in {"pocket_force": "N", "inner_load": "N", "roller_slip": "1"}.items():
+        columns |= {f"{name}_{j + 1} [{unit}]": x for j, x in enumerate(getattr(history, name).T)}
+    return columns
+
+
+def curve_columns(curves: Sequence["Curve"], x: "Axis", y: "Axis") -> dict[str, Shaped[np.ndarray, " points"]]:
+    """Points of curves in two parameters, in the units in which these are shown."""
+    joined = lambda rows: np.concatenate([np.asarray(row) for row in rows])
+    columns = {"curve": joined(np.full(c.x_value.size, i) for i, c in enumerate(curves, start=1))}
+    columns |= {x.head: x.shown(joined(c.x_value for c in curves)), y.head: y.shown(joined(c.y_value for c in curves))}
+    return columns | {"genuine": joined(c.genuine for c in curves)}

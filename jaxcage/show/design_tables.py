@@ -13,7 +13,7 @@ MOST = 8
 """Parameters listed in a budget."""
 
 
-def parameters_table(title: str, model: Any, found: Optimised, vary: Mapping[str, tuple[float, float]]) -> Table:
+def changed_table(title: str, model: Any, found: Optimised, vary: Mapping[str, tuple[float, float]]) -> Table:
     """Parameters that were varied, before and after."""
     info, before, rows = parameter_info(model), parameters(model), []
     for name, value in found.best.values.items():

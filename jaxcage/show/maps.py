@@ -13,7 +13,6 @@ from matplotlib.patches import Patch
 
 from .._errors import ArgumentError
 from ..analysis import failed
-from ..lanes import rpm
 from ..orbits import Curve
 from ..quantities import quantity
 from .diagrams import labelled, reported
@@ -51,7 +50,7 @@ def top_exponent(found: xr.Dataset) -> Float[np.ndarray, "x y"]:
 def _shown(values: np.ndarray, name: str, unit: str) -> tuple[Float[np.ndarray, " n"], str]:
     """Values of a parameter [SI] in the unit in which they are shown, and the label of their axis."""
     if name == SPEED:
-        return np.asarray(values) / rpm(1.0), ""
+        return np.asarray(values) * factor("rad/s", "rpm"), ""
     shown = SHOWN.get(unit, unit)
     return np.asarray(values) * factor(unit, shown), readable(name).capitalize() + (f" [{shown}]" if shown else "")
 

@@ -21,6 +21,7 @@ from .quantity_tables import displacements
 from .speed_axes import add_shaft_axes, mark_published, published_edges
 from .style import new_figure
 from .tables import Column, Table, rows_table
+from .zone_tables import zone_span
 
 
 ZONE_RANGE_RPM = (4000.0, 27500.0)
@@ -62,8 +63,7 @@ class ComparedEdge:
 def zones_in_range(zones: Sequence[Zone]) -> list[Zone]:
     """Zones that reach into the range in which two were published."""
     low, high = ZONE_RANGE_RPM
-    ends = [(z.onset.speed_rpm if z.onset else 0.0, z.exit.speed_rpm if z.exit else float("inf")) for z in zones]
-    return [z for z, (a, b) in zip(zones, ends, strict=True) if b > low and a < high]
+    return [z for z in zones if zone_span(z)[1] > low and zone_span(z)[0] < high]
 
 
 def wide_zones(zones: Sequence[Zone]) -> list[Zone]:
@@ -82,12 +82,8 @@ def compare_edges(published: PublishedCase, zones: Sequence[Zone], kind: str) ->
 
 
 def _matched(published: Sequence[tuple[float, float]], found: Sequence[Zone]) -> list[Zone | None]:
-    """For each published zone the found one that shares most speeds with it, if any does; each is taken once."""
-
-    def shared(zone: Zone, low: float, high: float) -> float:
-        onset = zone.onset.speed_rpm if zone.onset else 0.0
-        return min(zone.exit.speed_rpm if zone.exit else np.inf, high) - max(onset, low)
-
+    """The zone that shares most speeds with each published one, None if there is none; each is taken once."""
+    shared = lambda zone, low, high: min(zone_span(zone)[1], high) - max(zone_span(zone)[0], low)
     taken: list[Zone | None] = []
     for ends in published:
         best = max(found, key=lambda zone: shared(zone, *ends), default=None)

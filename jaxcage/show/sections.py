@@ -197,7 +197,7 @@ def _key_figures(model: Any) -> list[tuple[str, str]]:
 
 
 def _known(findings: Findings, chances: "Ensemble") -> Section:
-    """What draws from the ranges of a design do."""
+    """Chances of chaos over draws from the ranges of a design."""
     other = beside(findings)
     tables = chances_tables(findings.name, chances, other)
     if findings.operating and other is not None:
