@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import equinox as eqx
@@ -16,7 +16,7 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._form import compiled
 from .._parameters import choice, parameter
-from .._types import Scalar, State
+from .._types import Scalar
 from ..bearing import Bearing, Lubricant, brass, line_contact_approach, load_distribution, nu2310, vg
 from ..bearing.line_contact import raceway_loads_of_all
 from ..forces import Land, LandContact, RibFilm
@@ -158,7 +158,7 @@ class BearingModel(AbstractForcedSystem):
         surfaces = self.outer_radius * self.outer_speed - self.inner_radius * speed
         return jnp.asarray(surfaces / self.bearing.roller_diameter)
 
-    run_defaults: ClassVar[dict[str, Any]] = {
+    run_defaults: ClassVar[Mapping[str, Any]] = {
         "discard": 100,
         "revolutions": 200,
         "exponent_revolutions": 80,
@@ -203,7 +203,7 @@ class BearingModel(AbstractForcedSystem):
     def other_speed(self, speed: Scalar) -> tuple[str, Scalar]:
         return "cage speed in pure rolling", self.rolling_cage_speed(speed)
 
-    def centre(self, y: State) -> tuple[Scalar, Scalar]:
+    def centre(self, y: Float[Array, " dim"]) -> tuple[Scalar, Scalar]:
         cage = Bodies(*y[-OF_BODIES:])
         land_x, land_y = (cage.ring_x, cage.ring_y) if self.guidance == "inner" else (0.0, 0.0)
         return (cage.x - land_x) / self.clearance, (cage.y - land_y) / self.clearance
@@ -242,7 +242,7 @@ class BearingModel(AbstractForcedSystem):
     def starts(self, speed: Scalar) -> tuple[Float[Array, " dim"], ...]:
         return tuple(_starts(self, jnp.asarray(speed)))
 
-    def excursion(self, y: Any) -> Scalar:
+    def excursion(self, y: Float[Array, " dim"]) -> Scalar:
         """Eccentricity ratio of the cage in its land."""
         return jnp.hypot(*self.centre(y))
 
