@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import literature as table
 import numpy as np
+import xarray as xr
 import reference
 from literature import Row, beside, row, share
 from scipy.integrate import solve_ivp
@@ -86,7 +87,7 @@ def largest_exponent(of: Oscillator, starts: int, discard: int, periods: int, st
 
 def _exponents(
     system: Any, speed: float, centre: tuple[float, ...], starts: int, count: int, steps: int, discard: int, length: int
-) -> jc.Sweep:
+) -> xr.Dataset:
     around = np.asarray(centre) + np.random.default_rng(0).uniform(-1, 1, (starts, len(centre)))
     how: Any = dict(exponents=count, blocks=10, keep=1, method=jc.method("rodas4", steps=steps))
     begin = [tuple(map(float, s)) for s in around]
@@ -97,11 +98,11 @@ def driven_exponents() -> Iterator[Row]:
     for (name, theirs), (law, of) in zip(table.EXPONENTS.items(), LAWS, strict=True):
         system = jc.ForcedOscillator(law, coordinates=1)
         found = _exponents(system, of.frequency, (0.0, 0.0), 256, 1, 64, 500, 2000)
-        each = found.exponents[found.label == "chaotic", 0] * of.frequency / (2 * math.pi)
+        each = found.exponents.values[found.label.values == "chaotic", 0] * of.frequency / (2 * math.pi)
         sample = 3 * float(each.std(ddof=1)) / math.sqrt(each.size)
         yield beside(f"{name}, largest exponent", theirs, each.mean(), sample)
     found = _exponents(jc.ForcedOscillator(_ueda, coordinates=1), 1.0, (0.0, 0.0), 4, 2, 512, 20, 100)
-    ours = found.exponents[0].mean(axis=0).sum() / (2 * math.pi)
+    ours = found.exponents.values[0].mean(axis=0).sum() / (2 * math.pi)
     yield row("Ueda, sum of the exponents", -0.05, ours, 1e-6, table.TRACE)
 
 
@@ -118,7 +119,7 @@ def flows() -> Iterator[Row]:
         )
     )
     system = lambda rho: jc.ForcedSystem(law(rho), dimension=3)
-    found = _exponents(system(28.0), 2 * math.pi, (5.0, 5.0, 25.0), 64, 3, 256, 50, 500).exponents[0].mean(axis=0)
+    found = _exponents(system(28.0), 2 * math.pi, (5.0, 5.0, 25.0), 64, 3, 256, 50, 500).exponents.values[0].mean(axis=0)
     name = "Lorenz 10, 28, 8/3"
     yield from (
         beside(f"{name}, {n} exponent", theirs, x) for n, theirs, x in zip(ORDER, table.LORENZ, found, strict=True)
@@ -126,13 +127,13 @@ def flows() -> Iterator[Row]:
     yield row(f"{name}, sum", -41 / 3, found.sum(), 1e-4, table.TRACE)
     yield beside(f"{name}, dimension of Kaplan and Yorke", table.LORENZ_DIMENSION, 2 + found[0] / abs(found[2]))
     fixed = math.sqrt(8 / 3 * 19)
-    still = _exponents(system(20.0), 2 * math.pi, (fixed, fixed, 19.0), 2, 3, 256, 200, 500).exponents[0].mean(axis=0)
+    still = _exponents(system(20.0), 2 * math.pi, (fixed, fixed, 19.0), 2, 3, 256, 200, 500).exponents.values[0].mean(axis=0)
     decay = np.linalg.eigvals(np.array([[-10, 10, 0], [1, -1, -fixed], [fixed, fixed, -8 / 3]])).real
     yield row("Lorenz 10, 20, 8/3, largest exponent", decay.max(), still[0], 2e-3, table.EIGENVALUES)
     yield row("Lorenz 10, 20, 8/3, third exponent", decay.min(), still[2], 2e-3, table.EIGENVALUES)
     rates = lambda tau, y, speed: (-y[1] - y[2], y[0] + 0.2 * y[1], 0.2 + y[2] * (y[0] - 5.7))
     found = _exponents(jc.ForcedSystem(rates, dimension=3), 1.0, (0.0, -5.0, 0.0), 64, 3, 512, 20, 400)
-    each = found.exponents[0].mean(axis=0) / (2 * math.pi)
+    each = found.exponents.values[0].mean(axis=0) / (2 * math.pi)
     for n, theirs, x in zip(ORDER, table.ROESSLER, each, strict=True):
         yield beside(f"Roessler .2, .2, 5.7, {n} exponent", theirs, x)
 

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import pytest
 from helpers import elastic, roller_pass
-from jaxcage.cli._main import _parse
-from jaxcage.report import readings_words
 
 import jaxcage as jc
 from jaxcage.cli import main
+from jaxcage.cli.wrapper import _parse
 from jaxcage.files import (
     ConfigError,
     configuration,
@@ -24,6 +23,7 @@ from jaxcage.files import (
     to_si,
     toml_text,
 )
+from jaxcage.show.sources import readings_words
 
 
 # --- units -----------------------------------------------------------------------------------
@@ -106,11 +106,12 @@ def test_options_take_units(command: str):
 
 
 def test_speeds_loads_and_durations_take_units():
-    assert _parse(["poincare", "1a", "--speed", "8500 rpm"]).speed == pytest.approx(8500.0, rel=1e-12)
-    statics = _parse(["statics", "1a", "--load", "4.45 kN", "--shaft-speed", "100 rad/s"])
-    assert (statics.load, statics.shaft_speed) == pytest.approx((4450.0, 3000 / math.pi), rel=1e-12)
-    assert _parse(["statics", "1a"]).load is None
-    assert _parse(["impact", "1a", "--speed", "9550", "--duration", "1e-3 s"]).duration == pytest.approx(1.0)
+    read = lambda *arguments: _parse(list(arguments)).keywords
+    assert read("poincare", "1a", "--speed", "8500 rpm")["speed"] == pytest.approx(8500.0, rel=1e-12)
+    statics = read("statics", "1a", "--load", "4.45 kN", "--shaft-speed", "100 rad/s")
+    assert (statics["load"], statics["shaft_speed"]) == pytest.approx((4450.0, 3000 / math.pi), rel=1e-12)
+    assert read("statics", "1a")["load"] is None
+    assert read("impact", "1a", "--speed", "9550", "--duration", "1e-3 s")["duration"] == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("arguments, said", [

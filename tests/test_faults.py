@@ -18,13 +18,14 @@ import numpy as np
 import pytest
 import xarray as xr
 import zarr
-from jaxcage.cli._job import save_figure
 from report_example import swept
 
 import jaxcage as jc
 from jaxcage.cli import main
+from jaxcage.cli.answer import _write
+from jaxcage.cli.options import ShowOptions
 from jaxcage.files import save_model, write_template
-from jaxcage.lanes import Plan, Store, Study, open_study, run_study, save
+from jaxcage.lanes import Plan, Store, Study, load, open_study, run_study, save
 from jaxcage.show import new_figure, write_columns
 
 
@@ -53,7 +54,7 @@ def full_disk(room: int) -> Iterator[None]:
 def _figure(path: Path, n: int) -> Any:
     figure = new_figure(2.0, 2.0)
     figure.subplots().plot(np.sin(np.arange(10.0 * n)))
-    return save_figure(figure, path)
+    return _write(path, figure, ShowOptions(), None)
 
 
 WRITERS: dict[str, Callable[[Path, int], Any]] = {
@@ -158,7 +159,7 @@ def _harmful(folder: Path, mark: Path, consolidated: bool) -> None:
 
 @pytest.mark.filterwarnings("ignore:Object at peak is not recognized")
 @pytest.mark.parametrize("consolidated", [False, True])
-@pytest.mark.parametrize("read", [open_sweep, load_sweep, lambda path: open_study(path).load()])
+@pytest.mark.parametrize("read", [load, lambda path: open_study(path).load()])
 def test_a_store_cannot_run_code(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, consolidated: bool, read: Callable[[Path], Any]
 ):

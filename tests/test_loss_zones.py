@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers import made_sweep
 from laws import hardening as hardening_law
 from literature import DUFFING_FOLDS
 
@@ -42,19 +43,7 @@ def simulations(rpm, synchronous):
     count = rpm.size
     strobe = np.zeros((count, 1, 8, 2))
     strobe[~synchronous] = np.linspace(0.1, 0.9, 16).reshape(8, 2)
-    return jc.Sweep(
-        speed=rpm * PER_RPM,
-        strobe=strobe,
-        last=strobe[:, :, -1],
-        block_growth=np.zeros((count, 1, 1, 0)),
-        peak=np.zeros((count, 1)),
-        outcome=np.zeros((count, 1), dtype=int),
-        error=np.zeros((count, 1)),
-        doubt=np.zeros((count, 1, 0)),
-        scale=np.ones((count, 2)),
-        discard=0,
-        revolutions=8,
-    )
+    return made_sweep(rpm, strobe, np.full((count, 1, 2, 1), -1.0), discard=0, revolutions=8)
 
 
 def found(*stretches, lower=2000.0, upper=20000.0):
@@ -139,7 +128,7 @@ def test_principal_stretch_is_the_one_of_the_conventional_start():
 def chaotic(onset=None, leaves=None, uncertainty=100.0):
     edge = lambda rpm: None if rpm is None else jc.analysis.Edge(float(rpm), uncertainty, "chaotic")
     zone = jc.analysis.Zone("chaotic", edge(onset), edge(leaves), 0.8)
-    return jc.Zones((zone,), (), uncertainty, 500.0)
+    return jc.analysis.Zones((zone,), (), uncertainty, 500.0)
 
 
 def explained(zones, *stretches):

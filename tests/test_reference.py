@@ -13,8 +13,8 @@ from reference._land import pressurised_half
 from scipy.integrate import quad
 
 import jaxcage as jc
-from jaxcage.analysis import start_tangents
 from jaxcage.forces import pulse_spectrum
+from jaxcage.lanes import start_tangents
 
 
 def as_state(y):
@@ -194,4 +194,4 @@ def test_growth_in_chaos(rpm):
     brief = dict(discard=0, revolutions=6, blocks=6, confirm=False, horizon=0)
     ours = jc.sweep(model, speed, starts=at[None, None], method=jc.method("rk4", steps=8192), **brief)
     theirs = reference.growth(reference.field(model, speed), at, 6, direction=start_tangents(4, 1)[0])
-    np.testing.assert_allclose(ours.block_growth[0, 0, :, 0], theirs, rtol=0, atol=1e-4)
+    np.testing.assert_allclose(ours.block_growth.values[0, 0, :, 0], theirs, rtol=0, atol=1e-4)

@@ -101,7 +101,7 @@ def test_errors_are_those_of_noise():
         ({"directions": ("load", "load")}, "must name each parameter once, but has 'load' twice"),
         ({"designs": 16}, "`designs` must be an even number from 18 on, for so many directions, but 16 was given"),
         ({"spread": 0.5}, "`spread` must be above 0 and at most 0.3, but 0.5 was given"),
-        ({"statistics": ("slip",)}, "`statistics` must hold some of cage_slip, pocket_force_mean_sum_N"),
+        ({"statistics": ("slip",)}, "`statistics` must hold some of cage_slip, roller_slip_max"),
     ],
 )
 def test_refusals(options, said):

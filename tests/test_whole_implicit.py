@@ -24,8 +24,12 @@ def stiff():
     return model, start._replace(bodies=start.bodies.at[:2].set(place))
 
 
+IMPLICIT = pytest.param(jc.method("kvaerno5", tolerance=1e-6), marks=pytest.mark.slow)
+"""Its program takes a minute to compile."""
+
+
 @pytest.mark.wide
-@pytest.mark.parametrize("method", [jc.native(1e-6), jc.method("kvaerno5", tolerance=1e-6)], ids=["native", "kvaerno5"])
+@pytest.mark.parametrize("method", [jc.native(1e-6), IMPLICIT], ids=["native", "kvaerno5"])
 def test_a_stiff_arc(stiff, method):
     """Explicit and implicit steps reach the state that LSODA reaches on the second implementation, and what the shaft
     gives is lost or stored."""

@@ -11,11 +11,11 @@ from test_whole_motion import SPEED, bearing
 import jaxcage as jc
 from jaxcage.analysis import (
     OrderSpectrum,
-    bearing_history,
     bearing_orders,
     bearing_spectra,
-    equivalent_synchronous_force,
+    measures,
     named_lines,
+    roller_history,
 )
 from jaxcage.models import rolling_start
 
@@ -30,7 +30,7 @@ def run():
     model = bearing()
     start = rolling_start(model, SPEED, cage=1)
     ran = jc.simulate(model, SPEED, revolutions=2, samples=SAMPLES, start=start)
-    return model, ran, bearing_history(model, ran, SPEED)
+    return model, ran, roller_history(model, ran)
 
 
 def test_pocket_forces_are_those_of_the_second_implementation(run):
@@ -50,17 +50,17 @@ def test_pocket_forces_are_those_of_the_second_implementation(run):
 
 def test_impulse_wear_and_torque_are_integrals(run):
     model, ran, history = run
-    found = jc.bearing_measures(model, ran, SPEED)
+    found = measures(model, ran).value
     spent = ran.time[-1] - ran.time[0]
-    assert found.pocket_impulse_N_s == pytest.approx(found.pocket_force_mean_sum_N * spent / 2, rel=1e-12)
+    assert found("pocket_impulse_N_s") == pytest.approx(found("pocket_force_mean_sum_N") * spent / 2, rel=1e-12)
     land = np.hypot(*history.land_on_cage.T)
-    assert found.land_impulse_N_s == pytest.approx(land[1:] @ np.diff(ran.time) / 2, rel=0.15)  # few samples for it
+    assert found("land_impulse_N_s") == pytest.approx(land[1:] @ np.diff(ran.time) / 2, rel=0.15)  # few samples for it
     rubbed = ran.total("pocket_friction") / float(model.pockets.pocket_friction)  # mu N v: the sliding is fast
     assert ran.total("pocket_rubbing") == pytest.approx(rubbed, rel=1e-4)
     wear = 6e-4 * rubbed / spent / 0.93e9 * 1e9 * 3600
-    assert found.pocket_wear_mm3_per_h == pytest.approx(wear, rel=1e-4)
-    assert found.land_wear_mm3_per_h == pytest.approx(0.0, abs=1e-9) and found.eccentricity_max < 0.97
-    assert found.friction_torque_parts_N_m["film"] * SPEED == pytest.approx(found.power_parts_W["film"], rel=1e-12)
+    assert found("pocket_wear_mm3_per_h") == pytest.approx(wear, rel=1e-4)
+    assert found("land_wear_mm3_per_h") == pytest.approx(0.0, abs=1e-9) and found("eccentricity_max") < 0.97
+    assert found("friction_torque_N_m") * SPEED == pytest.approx(found("friction_power_W"), rel=1e-12)
 
 
 def test_the_land_wears_where_it_is_touched():
@@ -79,7 +79,7 @@ def test_the_land_wears_where_it_is_touched():
 
 def test_the_synchronous_force_of_a_known_one(run):
     """Of a run whose pocket force is 7 cos(theta - 0.3) + 2 horizontally and 3 sin(2 theta) vertically."""
-    _, ran, _ = run
+    model, ran, _ = run
     theta = ran.angle - ran.angle[0]
     time = theta / 400.0
     fx, fy = 7 * np.cos(theta - 0.3) + 2, 3 * np.sin(2 * theta)
@@ -88,9 +88,11 @@ def test_the_synchronous_force_of_a_known_one(run):
     for name, f in (("x", fx), ("y", fy)):
         for part, wave in (("cos", np.cos(theta)), ("sin", np.sin(theta))):
             integrals[:, ran.beside.index(f"pocket_{name}_{part}")] = running(f * wave)
-    x, y, error = equivalent_synchronous_force(dataclasses.replace(ran, time=time, integrals=integrals))
-    assert (x, y) == (pytest.approx(7.0, rel=1e-9), pytest.approx(0.0, abs=1e-9))
-    assert error == pytest.approx(0.0, abs=1e-9)
+    integrals[:, ran.beside.index("time")] = time
+    found = measures(model, dataclasses.replace(ran, time=time, integrals=integrals))
+    for name, force in (("synchronous_force_x_N", 7.0), ("synchronous_force_y_N", 0.0)):
+        assert found[name].value == pytest.approx(force, rel=1e-9, abs=1e-9)
+        assert found[name].error == pytest.approx(0.0, abs=1e-9)
 
 
 def beginning(found, n):
@@ -101,7 +103,7 @@ def beginning(found, n):
 
 def test_orders_of_rolling_and_names_of_lines(run):
     model, ran, history = run
-    orders = bearing_orders(model, ran, SPEED)
+    orders = bearing_orders(model, ran)
     rolling = 1 / 0.401037
     assert orders["inner ring"] == pytest.approx(rolling, rel=0.03)
     assert orders["roller pass, outer ring"] == 13

@@ -5,6 +5,7 @@ Samples of a history are states; the forces at them are worked out again by the 
 
 import dataclasses
 from collections.abc import Mapping
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -59,8 +60,8 @@ class RollerHistory:
 def _at_samples(model: BearingModel, speed: Scalar, states: BearingState) -> tuple[Array, ...]:
     at = model.at_speed(speed)
 
-    def one(state: BearingState) -> tuple[Array, ...]:
-        f = at.forces(state)
+    def one(state: BearingState) -> tuple[Any, ...]:
+        f: Any = at.forces(state)
         g, pocket = f.geometry, f.pocket
         x = jnp.sum(pocket.along * g.pocket_sin - pocket.out * g.pocket_cos)
         y = jnp.sum(-pocket.along * g.pocket_cos - pocket.out * g.pocket_sin)

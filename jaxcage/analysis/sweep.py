@@ -40,7 +40,7 @@ def resolution_rpm(found: xr.Dataset) -> float:
 
 def restless(found: xr.Dataset) -> Bool[np.ndarray, " speeds"]:
     """Speeds at which some lane is or was chaotic while observed."""
-    return np.isin(found["label"].values, ("chaotic", "transient")).any(axis=1)
+    return np.asarray(np.isin(found["label"].values, ("chaotic", "transient")).any(axis=1))
 
 
 def survival_at(found: xr.Dataset, i: int) -> Survival:

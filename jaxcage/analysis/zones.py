@@ -220,7 +220,7 @@ def zones(sweep: xr.Dataset, close_below_rpm: float | None = None) -> Zones:
     rpm, label = sweep["rpm"].values, sweep["label"].values
     close_below_rpm = closing_width(rpm) if close_below_rpm is None else close_below_rpm
     lasts, chaotic, sound = lasting(sweep), restless(sweep), np.all(~failed(sweep), axis=1)
-    synchronous = np.any(label == "periodic-1", axis=1)
+    synchronous: np.ndarray = np.any(label == "periodic-1", axis=1)
     met = _Speeds(synchronous | sound, np.zeros_like(sound), np.mean(label == "periodic-1", axis=1))
     chaos = _Speeds(chaotic | sound, _undecided(sweep, chaotic), chaotic_share(sweep))
     return Zones(

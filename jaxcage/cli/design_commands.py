@@ -84,8 +84,8 @@ def design(
         raise InputError(f"Option --scouts must be 0 or at least {searches - 1}, but {scouts} was given.")
     if worst < 1 and not laws:
         raise InputError("Option --worst goes with --scatter.")
-    usual = subject.usual({"wear": 1e3, "force": 1e3, "power": 0.0}, dict.fromkeys(d.TERMS, 1.0))
     given = {"wear": wear, "force": force, "impulse": impulse, "power": power, "slip": slip, "balance": balance}
+    usual = subject.usual({"wear": 1e3, "force": 1e3, "power": 0.0}, dict.fromkeys(given, 1.0))
     prices = {name: price if given[name] is None else given[name] for name, price in usual.items()}
     if subject.with_rollers and not sum(prices.values()):
         raise InputError(f"Options {', '.join(f'--{name}' for name in prices)} must not all be 0.")
@@ -110,7 +110,7 @@ def design(
             statistics = {n: d.statistic(fresh, n) for n in (*d.COMPARED, d.BALANCE)} | {d.OBJECTIVE: own.on(fresh)}
         else:
             found, itself = d.confirmed(found, objective_of(finer))
-            statistics = {"chaotic speeds [rpm]": finer, d.BALANCE: d.statistic(fresh, d.BALANCE)}
+            statistics = {"chaotic speeds": finer, d.BALANCE: d.statistic(fresh, d.BALANCE)}
             statistics |= {name: d.LandLoad(fresh, name) for name in (*d.LAND_LOADS, "least film")}
             better = found.best.objective < itself
         rows, failed = d.before_and_after(model, found.best.model, fresh, statistics)

@@ -32,7 +32,7 @@ from .objective import AbstractObjective, Design, DesignSpace, Measured
 
 
 AT_BOUND = 0.01
-"""Distance from a bound, as a part of the bounds' distance, within which a parameter is at the bound."""
+"""Distance from a bound within which a parameter is at the bound, as a part of the bounds' distance."""
 INSIDE = 0.02
 """Distance of starts from the bounds, where a logistic function has no slope."""
 SAME = 0.05

@@ -27,9 +27,9 @@ class SobolIndices:
     """Shares of an objective's variance, with 95 % intervals by the bootstrap."""
 
     first: dict[str, float]
-    """Due to a parameter alone."""
+    """Share due to a parameter alone."""
     total: dict[str, float]
-    """Due to it and all its interactions."""
+    """Share due to a parameter and all its interactions."""
     first_interval: dict[str, tuple[float, float]]
     total_interval: dict[str, tuple[float, float]]
     evaluations: int
@@ -41,18 +41,16 @@ class SobolIndices:
 
     @property
     def doubtful(self) -> tuple[str, ...]:
-        """Parameters of which an index has an interval all outside 0 to 1, or wider than itself and than `NARROW`, or
-        none: then so few samples differ that some of the bootstrap's are all alike. One a little below 0, with an
-        interval that reaches 0, is what an index of 0 looks like."""
+        """Parameters with an index whose interval lies outside 0 to 1, is wider than the index and `NARROW`, or is NaN
+        because so few samples differ that some of the bootstrap's are all alike."""
         rows = [(self.first, self.first_interval), (self.total, self.total_interval)]
         bad = lambda value, pair: not (pair[0] <= 1 and pair[1] >= 0 and pair[1] - pair[0] <= max(abs(value), NARROW))
         return tuple(n for n in self.first if any(bad(value[n], pair[n]) for value, pair in rows))
 
     @property
     def samples_wanted(self) -> int:
-        """Base samples, a power of 2, by which all intervals should be no wider than `NARROW`: widths fall with the
-        root of their number. Where one has no interval, it is taken as 1 wide. Twice as many at least if any is in
-        doubt."""
+        """Base samples, a power of 2, with which all intervals should be at most `NARROW` wide: widths fall with the
+        root of their number. A missing interval is taken as 1 wide. At least twice as many if any is in doubt."""
         least = 2 * self.samples if self.doubtful else self.samples
         widths = [b - a for pairs in (self.first_interval, self.total_interval) for a, b in pairs.values()]
         widest = max(NARROW, *(1.0 if math.isnan(w) else w for w in widths))
@@ -60,7 +58,7 @@ class SobolIndices:
 
     @property
     def warning(self) -> str | None:
-        """What to say where indices are not known well enough to be believed."""
+        """Warning for indices with wide intervals; None if there are none."""
         if not self.doubtful:
             return None
         return (
@@ -116,8 +114,9 @@ def global_sensitivity(
 def sobol_of(
     evaluate: Callable[[np.ndarray], np.ndarray], names: Sequence[str], *, samples: int, seed: int = 0
 ) -> SobolIndices:
-    """Sobol indices of a function of places between 0 and 1, of shape (names, designs), with one row of values; 0, and
-    their intervals too, of a parameter that changes nothing in any sample, and all of them if none does.
+    """Sobol indices of a function of places between 0 and 1, of shape (names, designs), with one row of values.
+
+    Index and interval of a parameter that changes nothing in any sample are 0.
 
     **Raises:** `ValueError` for samples that are no power of 2.
     """

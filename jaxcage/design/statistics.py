@@ -183,6 +183,8 @@ class Chaos(AbstractStatistic):
     times: float = 1.0
     softness: float = 0.02
     """Half width of the step, in exponents per revolution."""
+    measured_in: str = "1"
+    """Unit of the number."""
 
     def __post_init__(self):
         if not self.softness > 0:
@@ -197,6 +199,9 @@ class Chaos(AbstractStatistic):
     def samples(self, models: Models) -> Float[np.ndarray, "k 1 1"]:
         return self.times * self.runs.mean(self.levels(models))[:, None, None]
 
+    def unit(self, model: AbstractForcedSystem) -> str:
+        return self.measured_in
+
 
 def chaotic_width(
     first_rpm: float, last_rpm: float, count: int = 48, softness: float = Chaos.softness, **runs: Any
@@ -207,7 +212,7 @@ def chaotic_width(
 
     **Returns:** an objective in rpm, at the resolution of the grid.
     """
-    return Chaos(Runs(rpm(first_rpm, last_rpm, count), **runs), last_rpm - first_rpm, softness)
+    return Chaos(Runs(rpm(first_rpm, last_rpm, count), **runs), last_rpm - first_rpm, softness, "rpm")
 
 
 def chaotic_share(
@@ -342,7 +347,9 @@ def measure(runs: Runs, name: str) -> AbstractObjective:
 def relative(objective: AbstractObjective, model: AbstractForcedSystem, price: float) -> AbstractObjective:
     """`price` times an objective over its value for the model as it is, or over what is next to nothing if that is
     larger or the model fails."""
-    beside = np.fmax(float(mean_of_known(objective.samples([model]).ravel())), objective.negligible(model))
+    each = objective.samples([model])
+    now = each[np.isfinite(each)].mean() if np.isfinite(each).any() else 0.0
+    beside = max(float(now), objective.negligible(model))
     return (price / beside if beside else 0.0) * objective
 
 

@@ -14,13 +14,12 @@ from jaxtyping import Array, Float
 from .._arguments import require_at_least, wrong
 from .._errors import ArgumentError
 from .._form import compiled
-from .._types import State
 from ..models import AbstractForcedSystem, require_speeds
 from ..solve import Lanes
 
 
 Speeds = float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"]
-States = int | Sequence[State] | Float[np.ndarray, "speeds states dim"] | None
+States = int | Sequence[Any] | Float[np.ndarray, "speeds states dim"] | None
 """Initial states: how many of the model's own, states for every speed, or states of each speed; all of its own."""
 DESIGN, SPEED, START = "design", "speed", "start"
 
@@ -83,7 +82,7 @@ class Plan:
         begin = np.stack([initial_states(model, speed, states) for model in models])
         shape = begin.shape[:3]
         which, at = (np.repeat(x.ravel(), shape[2]) for x in np.indices(shape[:2]))
-        axes = dict(zip((DESIGN, SPEED, START), shape, strict=True))
+        axes: dict[str, int] = dict(zip((DESIGN, SPEED, START), shape, strict=True))
         if not isinstance(designs, Sequence):
             del axes[DESIGN]
         lanes = Lanes.of(models, speed[at], which)
@@ -143,7 +142,7 @@ def initial_states(
                 "starts", said=f"must hold {wanted} for each of {speed.size} speeds, but has shape {states.shape}."
             )
         return states
-    rows = [np.array([float(c) for c in y]) for y in states]
+    rows = [np.asarray(getattr(y, "row", y), dtype=float) for y in states]
     if not rows or any(row.shape != (model.dimension,) for row in rows):
         raise ArgumentError("starts", said=f"must hold {wanted}, but holds {states}.")
     return np.broadcast_to(np.stack(rows), (speed.size, len(rows), model.dimension)).copy()

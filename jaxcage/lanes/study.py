@@ -2,6 +2,7 @@
 an earlier run stopped."""
 
 import dataclasses
+import functools
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -268,7 +269,10 @@ def label_map(
         allowed = f"0 or above the {run.discard} revolutions discarded, with an exponent and 2 blocks"
         said = f"must be {allowed}, but is {persist}."
         raise ArgumentError("persist", said=said)
-    say = lambda what: None if stage is None else lambda done, total: stage(what, done, total)
+
+    def say(what: str) -> Progress | None:
+        return None if stage is None else functools.partial(stage, what)
+
     every = np.arange(grid.size)
     found = run_lanes(grid.plan(model, every), run, say(f"{grid.size} lanes"))
     again = every[found["label"].values == "chaotic"] if persist else every[:0]

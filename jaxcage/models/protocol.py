@@ -97,7 +97,7 @@ class AbstractForcedSystem(eqx.Module):
         """Words for a speed that goes with the model's, and its value [rad/s]: a cage's shaft speed."""
         return None
 
-    def centre(self, y: State) -> tuple[Scalar, Scalar]:
+    def centre(self, y: Any) -> tuple[Scalar, Scalar]:
         """Centre of the cage from that of its land, over the clearance, in models that have one."""
         raise NotImplementedError
 
@@ -113,15 +113,15 @@ class AbstractForcedSystem(eqx.Module):
         """The field dy/dtau at `speed` [rad/s], with everything that depends on the speed alone evaluated once."""
 
     @abc.abstractmethod
-    def scale(self, speed: Scalar) -> State:
+    def scale(self, speed: Scalar) -> Any:
         """Characteristic magnitude of each state component: tolerances and tangent vectors are measured in it."""
 
     @abc.abstractmethod
-    def starts(self, speed: Scalar) -> tuple[State, ...]:
+    def starts(self, speed: Scalar) -> tuple[Any, ...]:
         """Initial states a sweep runs from unless told otherwise, the conventional one first."""
 
     @abc.abstractmethod
-    def excursion(self, y: State) -> Scalar:
+    def excursion(self, y: Any) -> Scalar:
         """Distance from the centre of the states for which the model is valid, 1 at their edge; for a cage, eps.
 
         A trajectory must start at 1 or less, is flagged beyond 1, and fails beyond `ESCAPE`. A system without such an

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import equinox as eqx
@@ -16,7 +16,7 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._form import compiled
 from .._parameters import choice, parameter
-from .._types import Scalar, State
+from .._types import Scalar
 from ..bearing import Bearing, Lubricant, brass, line_contact_approach, load_distribution, nu2310, vg
 from ..bearing.line_contact import raceway_loads_of_all
 from ..forces import Land, LandContact, RibFilm
@@ -158,7 +158,7 @@ class BearingModel(AbstractForcedSystem):
         surfaces = self.outer_radius * self.outer_speed - self.inner_radius * speed
         return jnp.asarray(surfaces / self.bearing.roller_diameter)
 
-    run_defaults: ClassVar[dict[str, Any]] = {
+    run_defaults: ClassVar[Mapping[str, Any]] = {
         "discard": 100,
         "revolutions": 200,
         "exponent_revolutions": 80,
@@ -203,7 +203,7 @@ class BearingModel(AbstractForcedSystem):
     def other_speed(self, speed: Scalar) -> tuple[str, Scalar]:
         return "cage speed in pure rolling", self.rolling_cage_speed(speed)
 
-    def centre(self, y: State) -> tuple[Scalar, Scalar]:
+    def centre(self, y: Float[Array, " dim"]) -> tuple[Scalar, Scalar]:
         cage = Bodies(*y[-OF_BODIES:])
         land_x, land_y = (cage.ring_x, cage.ring_y) if self.guidance == "inner" else (0.0, 0.0)
         return (cage.x - land_x) / self.clearance, (cage.y - land_y) / self.clearance
@@ -242,7 +242,7 @@ class BearingModel(AbstractForcedSystem):
     def starts(self, speed: Scalar) -> tuple[Float[Array, " dim"], ...]:
         return tuple(_starts(self, jnp.asarray(speed)))
 
-    def excursion(self, y: Any) -> Scalar:
+    def excursion(self, y: Float[Array, " dim"]) -> Scalar:
         """Eccentricity ratio of the cage in its land."""
         return jnp.hypot(*self.centre(y))
 
@@ -304,12 +304,11 @@ class BearingModel(AbstractForcedSystem):
         )
 
 
-def slowness(
-    depth: Float[np.ndarray, "*lanes"], radial: Float[np.ndarray, "*lanes"], cage_speed: Float[np.ndarray, "*lanes"]
-) -> Float[np.ndarray, "*lanes"]:
+def slowness(depth: Any, radial: Any, cage_speed: Any) -> Any:
     """Number of a loaded roller's periods in a sixteenth of a revolution over `PERIODS`, 1 to `SLOWEST`.
 
-    **Arguments:** magnitudes of a roller's depth in its raceway [m] and its radial speed [m/s]; cage speed [rad/s].
+    **Arguments:** magnitudes of a roller's depth in its raceway [m] and its radial speed [m/s]; cage speed [rad/s]:
+    numbers, or NumPy arrays of lanes.
     """
     turned = PERIODS * TURN * depth / radial * np.abs(cage_speed)
     return np.clip(SPACING / turned, 1.0, SLOWEST)

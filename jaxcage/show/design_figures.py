@@ -34,7 +34,7 @@ from .style import (
 
 
 if TYPE_CHECKING:
-    from ..design import BearingGradient, BeforeAfter, Optimised
+    from ..design import MeanGradient, BeforeAfter, Optimised
 
 
 FIRST = ("guidance_gap", "eccentricity")
@@ -101,7 +101,7 @@ def largest_first(sensitivities: Sequence[Sensitivity], most: int) -> list[str]:
     return [*first, *rest][:most]
 
 
-def statistic_bars(found: "BearingGradient", title: str = "") -> Figure:
+def statistic_bars(found: "MeanGradient", title: str = "") -> Figure:
     """A panel for each statistic that is not 0: elasticity by each direction, with bars of two standard errors."""
     shown = [each for each in found.statistics.values() if each.value]
     names = [readable(name).replace("+", ",\n") for name in shown[0].directions] if shown else []

@@ -54,6 +54,11 @@ class Verdict:
     percent: float | None = None
     """The same, in per cent of the nearer end of the operating speed."""
 
+    def __str__(self) -> str:
+        if self.distance_rpm is None:
+            return self.where
+        return f"{self.where}; nearest edge: {self.edge}, {self.distance_rpm:.0f} rpm ({self.percent:.1f} %) away"
+
 
 def read_operating(text: str, model: AbstractForcedSystem, unsaid: Whose | None = None) -> tuple[Operating, ...]:
     """Speeds and ranges such as `8500, 12000-15000`, `900 rad/s, 1200 to 1500 rad/s` or `20000-24000 rpm shaft`.

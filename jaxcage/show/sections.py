@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -91,9 +91,16 @@ def _both(findings: Findings, at: Operating) -> str:
     return str(at) if other is None else f"{at} (shaft {at.of_shaft(1 / other[1])})"
 
 
-def assess(findings: Findings) -> list[tuple[Operating, dict[str, Verdict]]]:
-    """Verdicts on each operating speed by kind of zone."""
-    return [(at, _verdicts(findings, at)) for at in findings.operating]
+class Assessed(NamedTuple):
+    """An operating speed with the verdicts on it by kind of zone."""
+
+    at: Operating
+    verdicts: dict[str, Verdict]
+
+
+def assess(findings: Findings) -> list[Assessed]:
+    """Verdicts on each operating speed."""
+    return [Assessed(at, _verdicts(findings, at)) for at in findings.operating]
 
 
 def _verdicts(findings: Findings, at: Operating) -> dict[str, Verdict]:

@@ -388,25 +388,33 @@ def _histories(
         numbers = lanes.numbers(engine, some)
         ran = engine(numbers, y0[some] / scale, total, total, method, threads=cores())
         states = np.concatenate([(y0[some] / scale)[:, None], ran.strobe], axis=1)
-        error[some] = sampled_error(engine, numbers, states, samples, method).max(axis=1)
+        repeated, begin = np.repeat(np.arange(some.size), total), np.tile(np.arange(total) % samples, some.size)
+        begins, ends = (x.reshape(repeated.size, -1) for x in (states[:, :-1], states[:, 1:]))
+        dim, given = lanes.system.dimension, engine.picked(numbers, repeated)
+        apart = errors_of_parts(engine, given, begins, ends, dim, method, begin=begin).reshape(some.size, total)
+        error[some] = errors_of_stretches(apart, samples, method).max(axis=1)
         seen[some] = states[:, :-1] * scale[:, None, :]
     return seen, error
 
 
-def sampled_error(
+def errors_of_parts(
     engine: Engine | JaxEngine,
     numbers: Any,
-    states: Float[np.ndarray, "lanes n dim"],
-    samples: int,
+    begins: Float[np.ndarray, "parts numbers"],
+    ends: Float[np.ndarray, "parts numbers"],
+    dimension: int,
     method: AbstractMethod,
-) -> Float[np.ndarray, "lanes revolutions"]:
-    """Error of each revolution: the sum of those of its parts, each three times the distance of its end from that by
-    the method's reference, and the tolerance at least. Of states in units of the scale, the first at phase 0."""
-    count, n = states.shape[0], states.shape[1] - 1
-    repeated = engine.picked(numbers, np.repeat(np.arange(count), n))
-    begin = np.tile(np.arange(n) % samples, count)
-    starts = states[:, :-1].reshape(count * n, -1)
-    sharper = engine(repeated, starts, 1, 1, method.reference, threads=cores(), begin=begin).state
-    apart = SURE * np.max(np.abs(sharper.reshape(count, n, -1) - states[:, 1:]), axis=2)
-    padded = np.pad(apart, ((0, 0), (0, -n % samples)))
-    return np.maximum(padded.reshape(count, -1, samples).sum(axis=2), getattr(method, "tolerance", 0.0))
+    **more: Any,
+) -> Float[np.ndarray, " parts"]:
+    """Error of each part of a run [scale]: three times the distance of its end from that by the method's reference."""
+    sharper = engine(numbers, begins, 1, 1, method.reference, threads=cores(), **more).state
+    return SURE * np.max(np.abs(sharper - ends)[:, :dimension], axis=1)
+
+
+def errors_of_stretches(
+    apart: Float[np.ndarray, "*lanes parts"], stretch: int, method: AbstractMethod
+) -> Float[np.ndarray, "*lanes stretches"]:
+    """Errors of a number of parts together: their sum, and the tolerance at least."""
+    padded = np.pad(apart, [(0, 0)] * (apart.ndim - 1) + [(0, -apart.shape[-1] % stretch)])
+    summed = padded.reshape(*apart.shape[:-1], -1, stretch).sum(axis=-1)
+    return np.maximum(summed, getattr(method, "tolerance", 0.0))

@@ -113,7 +113,8 @@ class JaxEngine:
         t = np.zeros((lanes, 0, dim)) if tangents is None else tangents.copy()
         strobe, growth = np.full((lanes, keep, dim), np.nan), np.full((lanes, strobes, m), np.nan)
         peaks = np.full((lanes, keep, self._recorded), np.nan) if self._recorded else np.zeros((lanes, 1, 1))
-        mark, size = np.zeros(lanes), min(MOST, -(-lanes // (UNIT * threads)) * UNIT)
+        unit = 1 if self._recorded else UNIT
+        mark, size = np.zeros(lanes), min(MOST, -(-lanes // (unit * threads)) * unit)
         first = np.broadcast_to(np.asarray(begin, dtype=int), lanes)
         parts = None if turn is None else np.broadcast_to(REVOLUTION / np.asarray(turn, dtype=float), lanes)
 

@@ -34,7 +34,7 @@ class Pieces(NamedTuple):
 
 
 def can_be_kernel(solver: Any) -> TypeGuard[KernelSolver]:
-    """True if a step of `solver` is a plain formula: our own, and explicit methods whose last stage is the next first."""
+    """True if a step of `solver` is a plain formula, as of ours, and of explicit methods whose last stage is kept."""
     if isinstance(solver, dfx.AbstractERK):
         return isinstance(solver.tableau, dfx.ButcherTableau) and solver.tableau.fsal
     return isinstance(solver, AbstractRosenbrock | NewmarkBeta)

@@ -31,6 +31,8 @@ from .steps import with_tangents
 
 FIRST_STEPS = 64
 """The first of adaptive steps is a revolution over so many."""
+MOST_WATCHED = 4096
+"""Most adaptive steps from sample to sample, where values of each step are stored."""
 SHARPER = 1e-2
 """Tolerance of the run that measures errors, as a fraction of the tolerance."""
 DEFAULT_TOLERANCE = 1e-6
@@ -246,10 +248,10 @@ class AdaptiveSteps(AbstractMethod):
         field, system, scale = pieces
         length = REVOLUTION / jnp.asarray(parts, dtype=float)
         watches = isinstance(field, BesideField)
-        saved, norm = dfx.SubSaveAt(t1=True), optx.rms_norm
+        saved, norm, most = dfx.SubSaveAt(t1=True), optx.rms_norm, self.max_steps
         if watches:  # at each step, and errors of the state alone control the steps
             seen = dfx.SubSaveAt(steps=True, fn=lambda t, y, args: field.watch(multiply(y, scale)))
-            saved, norm = (saved, seen), lambda y: jnp.max(jnp.abs(y[0]))
+            saved, norm, most = (saved, seen), lambda y: jnp.max(jnp.abs(y[0])), min(most, MOST_WATCHED)
         solution = dfx.diffeqsolve(
             _term(self.solver),
             self.solver,
@@ -261,7 +263,7 @@ class AdaptiveSteps(AbstractMethod):
             stepsize_controller=dfx.PIDController(self.rtol, self.atol, pcoeff=0.3, icoeff=0.4, norm=norm),
             saveat=dfx.SaveAt(subs=saved),
             adjoint=dfx.ForwardMode(),
-            max_steps=self.max_steps,
+            max_steps=most,
             throw=False,
         )
         assert solution.ys is not None

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
 from .._arguments import require_at_least, shown
 from .._checks import require_x64
@@ -24,7 +24,7 @@ from ..models import (
     require_speeds,
     rollers_of,
 )
-from .engine import CHUNK, RETRIES, SURE, Lanes, cores, has_machine_code
+from .engine import CHUNK, RETRIES, Lanes, errors_of_parts, errors_of_stretches, has_machine_code
 from .kernel import REVOLUTION
 from .method import IMPLICIT, AbstractMethod, FixedSteps, NativeSteps, native
 from .outcomes import INACCURATE, OUTCOMES, codes_of
@@ -36,6 +36,8 @@ BEARING_TOLERANCE, BEARING_ERROR = 1e-5, 1e-2
 """The same for a whole bearing, and the largest measured error of a stretch that can be compared."""
 MOST_PARTS = 1000
 """Most parts from sample to sample in which errors are measured."""
+Start = State | BearingState | Float[Array, " dim"] | Float[np.ndarray, " dim"]
+"""An initial state [SI]: a tuple of numbers; of a whole bearing a row of them, or by name."""
 SERVED_BADLY = [OUTCOMES.index(name) for name in ("dt_min_reached", "max_steps_reached")]
 
 
@@ -66,7 +68,7 @@ class Trajectory:
     integration has made."""
     beside: tuple[str, ...] = ()
     """Names of the quantities that are integrated beside the state."""
-    integrals: Float[np.ndarray, "n beside"] = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+    integrals: Float[np.ndarray, "recorded beside"] = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
     """Their values from the beginning [SI]."""
     watched: tuple[str, ...] = ()
     """Names of the quantities whose largest values are recorded."""
@@ -119,7 +121,7 @@ class Trajectory:
     _repr_html_ = notebook_html
 
 
-def _start(system: AbstractForcedSystem, speed: float, start: State | BearingState | None) -> np.ndarray:
+def _start(system: AbstractForcedSystem, speed: float, start: Start | None) -> np.ndarray:
     """The first state, with the quantities beside it behind."""
     rest, dim = np.array(system.beside_start, dtype=float), system.dimension
     if isinstance(start, BearingState):
@@ -204,12 +206,10 @@ def _run(course: _Course, start: np.ndarray, method: AbstractMethod) -> _Ran:
     ends = np.flatnonzero(np.all(np.isfinite(y[1:]), axis=1))
     apart = np.zeros(n)
     for some in np.split(ends, range(CHUNK, ends.size, CHUNK)) if ends.size else ():
-        at, starts = engine.picked(numbers, some), y[some] / scale[some]
-        options: dict[str, Any] = dict(threads=cores(), begin=begin[some], turn=course.turn_of(some))
-        again = engine(at, starts, 1, 1, method.reference, **options).state
-        apart[some] = SURE * np.max(np.abs(again - y[some + 1] / scale[some])[:, :dim], axis=1)
-    padded = np.pad(apart, (0, -n % course.stretch)).reshape(-1, course.stretch)
-    errors = np.maximum(padded.sum(axis=1), getattr(method, "tolerance", 0.0))
+        given = engine.picked(numbers, some), y[some] / scale[some], y[some + 1] / scale[some]
+        turn = course.turn_of(some)
+        apart[some] = errors_of_parts(engine, *given, dim, method, begin=begin[some], turn=turn)
+    errors = errors_of_stretches(apart, course.stretch, method)
     return _Ran(y, peaks, errors, code, steps)
 
 
@@ -247,7 +247,7 @@ def simulate(
     revolutions: int,
     samples: int = 64,
     discard: int = 0,
-    start: State | BearingState | None = None,
+    start: Start | None = None,
     method: AbstractMethod | None = None,
 ) -> Trajectory:
     """Time history at one speed.
@@ -276,7 +276,7 @@ def ramp(
     revolutions: int,
     samples: int = 64,
     discard: int = 0,
-    start: State | BearingState | None = None,
+    start: Start | None = None,
     method: AbstractMethod | None = None,
 ) -> Trajectory:
     """Time history of a true speed ramp: the speed changes continuously, by the same amount in every revolution.
@@ -344,7 +344,7 @@ def bearing_over_time(
     speed: Scalar,
     times: Float[np.ndarray, " n"],
     *,
-    start: State | BearingState | None = None,
+    start: Start | None = None,
     method: AbstractMethod | None = None,
 ) -> Trajectory:
     """Time history of a whole bearing with time as independent variable: for starting, coasting and free flight.
