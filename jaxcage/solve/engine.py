@@ -75,7 +75,7 @@ class Runner:
         strobes: int,
         keep: int,
         settings: Float[np.ndarray, " 4"],
-        step: Float[np.ndarray, " lanes"] | float,
+        step: Float[np.ndarray, " lanes"],
         tangents: Float[np.ndarray, "lanes tangents dim"] | None,
         threads: int,
         report: Callable[[int], None],
@@ -182,7 +182,8 @@ class Engine:
         if width not in self._runners:
             self._runners[width] = Runner(self.field, self._pair, width)
         settings = np.array([method.tolerance, *limits])
-        step = first if step is None else np.where(np.isnan(step), first, step)
+        given = np.broadcast_to(np.nan if step is None else step, len(state))
+        step = np.where(np.isnan(given), first, given)
         return self._runners[width](numbers, state, strobes, keep, settings, step, tangents, threads, report)
 
     def _limits(self, numbers: Any, turn: float, tolerance: float) -> tuple[float, float, float, float]:

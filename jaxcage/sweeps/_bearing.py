@@ -147,7 +147,7 @@ def sweep_bearings(
         sweeps.append(
             summed_up(
                 speed,
-                np.asarray(model.rolling_cage_speed(lane_speed[:each])),
+                np.repeat([float(model.rolling_cage_speed(v)) for v in speed.tolist()], each // speed.size),
                 float(PER_HOUR * model.wear.volume(1.0)),
                 BearingRecord(**mine),
                 block=block,
