@@ -35,7 +35,7 @@ REFUSED = [
     ("sweep 1a --first 0", "--first"),
     ("zones 1a --first 9000 --last 9000", "the range is 9000 to 9000 rpm"),
     ("sweep 1a --count 2.5", "--count"),
-    ("sweep 1a --count 1000000000000", "--count must be at most"),
+    ("sweep 1a --count 1000000000000", "at most 10000000"),
     ("sweep 1a --revolutions 37", "--revolutions must be a multiple of 10"),
     ("sweep 1a --exponents 9", "--exponents must be at most 4"),
     ("sweep 1a --solver euler", "--solver must be one of"),
@@ -44,7 +44,7 @@ REFUSED = [
     ("sweep 1a --out=", "--out must name a folder"),
     ("simulate 1a --speed 1e308", "--speed must be at most 1e+06 rpm"),
     ("simulate 1a --speed 100000", "62516 rpm"),
-    ("simulate 1a --speed 8500 --load '300 N'", "--load goes with a whole bearing"),
+    ("simulate 1a --speed 8500 --load '300 N'", "--load goes with a bearing"),
     ("poincare 1a", "--speed"),
     ("impact 1a --speed 8500 --duration 0", "--duration"),
     ("statics 1a --load -4450", "--load must be above 0 N"),
@@ -60,7 +60,6 @@ REFUSED = [
     ("map 1a --points 300", "--points must be ACROSSxUPWARDS"),
     ("map 1a --points 9x7 --x eccentricity", "--speed must be given"),
     ("map 1a --points 4x4 --persist 300", "--persist"),
-    ("map 1a --no-curves", "--points"),
     ("study 1a", "--vary must be given for the speed"),
     ("study 1a --vary speed=140Hz", "is in Hz"),
     ("study 1a --vary speed=1:2:1000 --vary load=1:2:40000", "lanes"),
@@ -77,7 +76,7 @@ REFUSED = [
     (f"{STUDY} --workers 2", "--workers go with --executor dask"),
     (f"{STUDY} --executor slurm", "--executor"),
     (f"{STUDY} --store ../elsewhere", "--store must name a folder within --out"),
-    ("design 1a --starts 3 --scouts 1", "--scouts"),
+    ("design 1a --searches 3 --scouts 1", "--scouts"),
     ("design 1a --scatter eccentricity=weibull", "weibull"),
     ("design 1a --worst 0.5", "--worst goes with --scatter"),
     ("design 1a --vary load=1:2 --vary load=1:3", "load was given twice"),
@@ -85,23 +84,20 @@ REFUSED = [
     ("sensitivity 1a --samples 3", "--samples must be a power of 2"),
     ("unknowns 1a", "must be a TOML file with ranges"),
     ("report 1a --operating fast", "--operating must be speeds"),
-    ("gradient 1a --speed 1e4", "--speed goes with a whole bearing"),
+    ("gradient 1a --speed 1e4", "--speed goes with a bearing"),
     ("reproduce --constants best", "--constants"),
     ("--tyro-print-completion nonsense", "'nonsense'"),
     # Whole bearings.
     ("bifurcations nu2310", "takes a cage"),
-    ("zones nu2310 --quick", "--quick does not go with a whole bearing"),
-    ("sweep nu2310 --exponents 2", "--exponents must be 1"),
-    ("runup nu2310 --last 200000", "at most 300 m/s"),
-    ("map nu2310 --rows 0", "--rows"),
-    ("compare nu2310 1a", "must be a whole bearing"),
+    ("sweep nu2310 --exponents 2", "--exponents must be at most 1"),
+    ("runup nu2310 --last 200000", "300 m/s at its land"),
+    ("compare nu2310 1a", "must be a bearing with its rollers"),
     ("gradient nu2310", "--speed must be given"),
     ("gradient nu2310 --speed 1e4 --by gap", "--by"),
     ("design nu2310 --speed 1e4 --vary load=1kN:5kN", "--vary must name one of"),
     (f"design nu2310 --speed 1e4 {WEIGHTS}", "must not all be 0"),
     ("sensitivity nu2310 --speed 1e4 --of noise", "--of must be one of"),
     ("study nu2310 --vary load=1kN", "--vary must be given for the speed"),
-    ("study nu2310 --vary speed=9000 --vary oil=32", "--vary must name one of speed"),
 ]
 
 
@@ -226,7 +222,7 @@ MODULES = """
 import sys
 from jaxcage.cli import main
 status = main(sys.argv[1:])
-print(status, sorted({"jax", "numpy", "scipy", "matplotlib"} & set(sys.modules)))
+print(status, sorted({"jax", "scipy", "matplotlib"} & set(sys.modules)))
 """
 
 

@@ -136,14 +136,16 @@ def reproduce(
     Args:
         constants: Set of constants that the paper does not print.
     """
+    from ..show import reproduction
+
     models = {name: jc.case(name, constants) for name in jc.bearing.PUBLISHED_CASES}
     with show.computing("reproduce") as say:
-        runs = jc.show.reproduction.run_all(models, report=say, **(QUICK if quick else {}))
-        document, tables, notes = jc.show.reproduction.reproduction(runs)
+        runs = reproduction.run_all(models, report=say, **(QUICK if quick else {}))
+        document, tables, notes = reproduction.reproduction(runs)
     verdicts = [each["verdict"] for each in document["conclusions"]]
     partly = f"{verdicts.count('holds in part')} in part"
     said = f"{verdicts.count('holds')} of the paper's {len(verdicts)} conclusions hold, {partly}."
-    files = {name: (f"_{name}.png", figure) for name, figure in jc.show.reproduction.paper_diagrams(runs)}
+    files = {name: (f"_{name}.png", figure) for name, figure in reproduction.paper_diagrams(runs)}
     return Answer(said, tables, notes, {"quick": quick, "constants": constants, **document}, files=files)
 
 

@@ -20,8 +20,6 @@ from .values import no_worse_balance, read_bounds, read_each, read_scatter
 
 LOADS = {"wear": "wear load", "force": "peak land force", "power": "film drag power"}
 """Price -> load of the land of a cage."""
-CHECKED_SPEEDS = 118
-"""Speeds of the sweeps by which a design is checked: every 200 rpm of the usual range."""
 FINER, STARTS = 2, 3
 """Multiple of the speeds of a search in the comparison of its best designs, and their initial states."""
 DESIGNED = o.Range(4000.0, 27500.0)
@@ -54,7 +52,6 @@ def design(
     steps: o.OptionalCount = None,
     batch: o.OptionalCount = None,
     seed: o.Seed = 0,
-    quick: o.Quick = False,
     means: o.MeanOptions = o.MeanOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
@@ -87,8 +84,8 @@ def design(
         raise InputError(f"Option --scouts must be 0 or at least {searches - 1}, but {scouts} was given.")
     if worst < 1 and not laws:
         raise InputError("Option --worst goes with --scatter.")
-    usual = subject.usual({"wear": 1e3, "force": 1e3, "power": 0.0}, dict.fromkeys(d.TERMS, 1.0))
     given = {"wear": wear, "force": force, "impulse": impulse, "power": power, "slip": slip, "balance": balance}
+    usual = subject.usual({"wear": 1e3, "force": 1e3, "power": 0.0}, dict.fromkeys(given, 1.0))
     prices = {name: price if given[name] is None else given[name] for name, price in usual.items()}
     if subject.with_rollers and not sum(prices.values()):
         raise InputError(f"Options {', '.join(f'--{name}' for name in prices)} must not all be 0.")
@@ -117,7 +114,6 @@ def design(
             statistics |= {name: d.LandLoad(fresh, name) for name in (*d.LAND_LOADS, "least film")}
             better = found.best.objective < itself
         rows, failed = d.before_and_after(model, found.best.model, fresh, statistics)
-        answer = _compared(subject, found, rows, over, seed, quick, say)
     stored.unlink(missing_ok=True)
     best, by_name = found.best, {row.name: row for row in rows}
     if d.OBJECTIVE in by_name:
@@ -134,46 +130,22 @@ def design(
         jc.show.before_and_after_table("Before and after, from the same initial states", rows),
         jc.show.changed_table(f"Design of {subject.name}", model, found, bounds),
         jc.show.optima_table(model, found),
-        *answer.tables,
     ]
-    return Answer(said, tables, [*notes, *answer.notes], document | answer.document, subject, answer.files)
+    files = {"figure": (".png", jc.show.optimum_figure(found, rows, subject.name))}
+    return Answer(said, tables, notes, document, subject, files)
 
 
 def _runs(subject: Subject, over: o.Range, means: o.MeanOptions, seed: int, **more: Any) -> tuple[Any, Any, Any]:
-    """How designs are run; of a cage the width of its chaotic speeds, and the same by more speeds and initial states."""
+    """How designs are run; of a cage the width of its chaotic speeds, and that by more speeds from other states."""
     if subject.with_rollers:
         length = means.length(starts=4, discard=10, revolutions=20)
         return jc.design.Runs.of_bearing(subject.speed(means.speed), **length, seed=seed, **more), None, None
-    low, *_, high = subject.range(o.Range(over.first, over.last), 2) * RPM
-    width = partial(jc.design.chaotic_width, low, high)
+    (low, *_, high), model = subject.range(o.Range(over.first, over.last), 2), subject.model
+    half, width = model.dimension // 2, partial(jc.design.chaotic_width, low * RPM, high * RPM)
+    size = 0.6 * float(model.clearance) * np.array([1.0] * half + [0.3 * low] * half)
+    states = size * np.random.default_rng(seed + 1).uniform(-1, 1, (STARTS, size.size))
     chaos = width(over.count or 48, **more)
-    return chaos.runs, chaos, width(FINER * (over.count or 48), starts=STARTS)
-
-
-def _compared(subject: Subject, found: Any, rows: Any, over: o.Range, seed: int, quick: bool, say: Any) -> Answer:
-    """Figure of a search; of a cage with zones of the designs before and after, by sweeps from other initial states."""
-    if subject.with_rollers:
-        return Answer("", files={"figure": (".png", jc.show.optimum_figure(found, rows, subject.name))})
-    model, speeds = subject.model, subject.range(o.Range(over.first, over.last), CHECKED_SPEEDS)
-    rng, half = np.random.default_rng(seed + 1), model.dimension // 2
-    size = float(model.clearance) * np.array([1.0] * half + [0.3 * speeds[0]] * half)
-    states = [tuple(0.6 * size * rng.uniform(-1, 1, size.size)) for _ in range(STARTS)]
-    swept, chaotic, lost, rpm = [], [], [], []
-    for when, each in (("before", model), ("after", found.best.model)):
-        given = {"starts": states, "discard": 300, "revolutions": 200, "progress": partial(say, f"sweep {when}")}
-        swept.append(jc.sweep(each, speeds, **given))
-        rpm.append(float(np.mean(jc.analysis.restless(swept[-1])) * np.ptp(swept[-1]["rpm"].values)))
-        chaotic += [{"design": when, **jc.show.zone_record(zone)} for zone in jc.zones(swept[-1]).zones]
-        if not quick:
-            loss = jc.loss_zones(jc.orbits.synchronous_orbits(each, speeds[0], speeds[-1], progress=say))
-            lost += [{"design": when, **jc.show.zone_record(zone)} for zone in loss.zones]
-    columns = [jc.show.Column("design", ())]
-    columns += [jc.show.Column(end, (), key=f"{end}_rpm", digits=0) for end in ("onset", "exit", "width")]
-    kinds = (("Chaotic", chaotic), ("Synchronous-loss", lost))
-    tables = [jc.show.rows_table(f"{kind} zones [rpm]", rows, columns) for kind, rows in kinds]
-    notes = [f"Chaotic speeds, by sweeps from other initial states: {rpm[0]:.0f} rpm before, {rpm[1]:.0f} rpm after"]
-    document = {"chaotic_rpm": rpm, "chaotic_zones": chaotic, "synchronous_loss_zones": lost}
-    return Answer("", tables, notes, document, files={"figure": (".png", jc.show.design_figure(found, *swept))})
+    return chaos.runs, chaos, width(FINER * (over.count or 48), starts=[*map(tuple, states)])
 
 
 def sensitivity(
@@ -229,6 +201,7 @@ def sensitivity(
     budgets = [d.tolerance_budget(slope, dict.fromkeys(names, deviation)) for slope, names in slopes]
     most, what = max(shares.total, key=shares.total.__getitem__), subject.usual("chaotic speeds", of.replace("_", " "))
     said = f"{most} matters most: with the other parameters it has {100 * shares.total[most]:.0f} % of the variance."
+    said = "These samples do not tell which parameter matters most." if most in shares.doubtful else said
     tables = [jc.show.sobol_table(f"{what.capitalize()} of {name}", shares)]
     tables += [jc.show.budget_table(budget, tolerance) for budget in budgets]
     notes = [shares.warning] if shares.warning else []
@@ -279,8 +252,9 @@ def unknowns(
         said = "These draws do not tell what to measure first."
     document = {"designs": found.evaluations, "doubtful": found.doubtful, "speeds_rpm": at * RPM}
     document["measure"] = {"what": most, "how": sources[most]}
-    table = jc.show.sobol_table(f"Chaotic share of {subject.name}", found, sources)
-    return Answer(said, [table], [found.warning] if found.warning else [], document, subject.certain)
+    notes = [*([found.warning] if found.warning else []), *(f"{label}: {how}" for label, how in sources.items())]
+    table = jc.show.sobol_table(f"Chaotic share of {subject.name}", found)
+    return Answer(said, [table], notes, document, subject.certain)
 
 
 def identify(

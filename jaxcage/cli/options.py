@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import math
 import os
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -62,13 +63,13 @@ def read_quantity(text: str, unit: str) -> float:
 
 def number(must: str = "be finite", holds: Callable[[float], bool] = math.isfinite, unit: str = "") -> Any:
     """An option that is a number, in `unit` or with a unit of its own, for which `holds` is true."""
+    most = LARGEST.get(unit, math.inf)
 
     def read(text: str) -> float:
         value = read_quantity(text, unit)
-        if not (math.isfinite(value) and holds(value)):
-            raise ValueError(f"must {must}, but {value:g} was given.")
-        if value > LARGEST.get(unit, math.inf):
-            raise ValueError(f"must be at most {LARGEST[unit]:g} {unit}, but {value:g} was given.")
+        if not (math.isfinite(value) and holds(value) and value <= most):
+            allowed = must if value <= most or math.isnan(value) else f"be at most {most:g} {unit}"
+            raise ValueError(f"must {allowed}, but {value:g} was given.")
         return value
 
     return _option({"": "FLOAT", "rpm": "RPM"}.get(unit, unit), read)
@@ -76,43 +77,31 @@ def number(must: str = "be finite", holds: Callable[[float], bool] = math.isfini
 
 def count(least: int) -> Any:
     """An option that is a whole number of at least `least`."""
-
-    def read(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            raise ValueError(f'must be an integer, but is "{text}".') from None
-        if not least <= value <= MOST:
-            raise ValueError(
-                f"must be at {f'most {MOST}' if value > MOST else f'least {least}'}, but {value} was given."
-            )
-        return value
-
-    return _option("INT", read)
+    fits = lambda text: text.strip().lstrip("+").isdecimal() and len(text) < 9 and int(text) >= least
+    return text(f"be an integer of at least {least} and at most {MOST}", fits, int, "INT")
 
 
-def pair(sign: str, what: str, holds: Callable[[int, int], bool]) -> Any:
-    """An option of two counts with a sign between them."""
-
-    def read(text: str) -> tuple[int, int]:
-        with contextlib.suppress(ValueError):
-            first, second = map(int, text.lower().split(sign))
-            if holds(first, second):
-                return first, second
-        raise ValueError(f"must be {what}, but '{text}' was given.")
-
-    return _option("NAME", read)
+def pair(sign: str, must: str, holds: Callable[[int, int], bool]) -> Any:
+    """An option of two counts with a sign between them, for which `holds` is true."""
+    split = lambda text: tuple(int(part) for part in text.lower().split(sign))
+    form = re.compile(rf"\d{{1,5}}{sign}\d{{1,5}}", re.IGNORECASE)
+    return text(must, lambda text: form.fullmatch(text) is not None and holds(*split(text)), split)
 
 
-def text(must: str = "hold a text", holds: Callable[[str], bool] = bool) -> Any:
-    """An option that is a text for which `holds` is true."""
+def text(
+    must: str = "hold a text",
+    holds: Callable[[str], bool] = bool,
+    read: Callable[[str], Any] = str,
+    metavar: str = "NAME",
+) -> Any:
+    """An option that is a text for which `holds` is true, as `read` makes of it."""
 
-    def read(given: str) -> str:
+    def checked(given: str) -> Any:
         if not holds(given):
             raise ValueError(f"must {must}, but '{given}' was given.")
-        return given
+        return read(given)
 
-    return _option("NAME", read)
+    return _option(metavar, checked)
 
 
 def is_within(path: str) -> bool:
@@ -124,7 +113,7 @@ def is_within(path: str) -> bool:
 
 _SPEED = number("be a speed above 0 rpm", lambda x: x > 0, "rpm")
 _OWN = "Bare numbers are the cage's [rpm], of a bearing with its rollers, or where a file says so, the shaft's"
-_SIDES = f"ACROSSxUPWARDS, each from {SIDE[0]} to {SIDE[-1]}, e.g. 300x300"
+_SIDES = f"be ACROSSxUPWARDS, each from {SIDE[0]} to {SIDE[-1]}, e.g. 300x300"
 _CASE = "A published case (1a, 1b, 2a, 2b, 3a, 3b), a bearing with its rollers (nu2310), or a TOML file."
 
 Case = Annotated[tyro.conf.Positional[str], arg(metavar="CASE", help=_CASE)]
@@ -146,7 +135,7 @@ OptionalText = Annotated[str | None, text()]
 Price = Annotated[float | None, number("be at least 0", lambda x: x >= 0)]
 Texts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 Points = Annotated[tuple[int, int] | None, pair("x", _SIDES, lambda a, b: a in SIDE and b in SIDE)]
-Shard = Annotated[tuple[int, int], pair("/", "I/N with I from 1 to N, e.g. 1/4", lambda i, n: 1 <= i <= n)]
+Shard = Annotated[tuple[int, int], pair("/", "be I/N with I from 1 to N, e.g. 1/4", lambda i, n: 1 <= i <= n)]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -312,5 +312,7 @@ def map_(
     elif x == "speed":
         files["figure"] = f"{stem}.png", drawn(title, draw, 10.0, 6.0)
     notes = [f"Not followed: {edge} ({why})" for edge, why in refused.items()]
-    most = f"; most points are {max(labels, key=labels.__getitem__)}" if (labels := document.get("labels")) else ""
-    return Answer(f"{len(curves)} edges were followed over {x} and {y}{most}.", tables, notes, document, subject, files)
+    labels, said = document.get("labels"), [f"{len(curves)} edges were followed"] if curves else []
+    said += [f"most points are {max(labels, key=labels.__getitem__)}"] if labels else []
+    said = f"Over {x} and {y} {' and '.join(said) or 'no edge could be followed'}."
+    return Answer(said, tables, notes, document, subject, files)

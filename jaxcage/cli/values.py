@@ -19,7 +19,9 @@ FORMS = "values such as 4000rpm:27500rpm:100, 0.3mm:0.6mm, 20um+-3um or 32,56,78
 MOST_CORNERS = 256
 """Combinations of smallest and largest values that are checked beforehand."""
 USUAL = {"guidance_gap": (0.7, 1.4), "eccentricity": (0.2, 2.5)}
-"""Parameters of a cage that are varied if none is named, and the bounds as parts of their values."""
+"""Parameters that are varied if none is named, and the bounds as parts of their values."""
+WITH_ROLLERS = {"pocket_clearance": (0.7, 1.4), "land_width": (0.7, 1.4)}
+"""The same of a bearing with its rollers, beside those of a cage."""
 
 
 def read_vary(given: Sequence[str], subject: Subject) -> dict[str, Any]:
@@ -40,11 +42,10 @@ def read_bounds(given: Sequence[str], subject: Subject) -> dict[str, tuple[float
     **Raises:** `InputError`.
     """
     model, names = subject.model, subject.usual((), jc.design.CAGE_PARAMETERS)
-    if not given and names:
-        return jc.design.usual_bounds(model)
     if not given:
-        now = {name: float(getattr(model, name)) for name in USUAL}
-        return {name: (low * now[name], high * now[name]) for name, (low, high) in USUAL.items() if now[name] > 0}
+        usual, now = USUAL | subject.usual({}, WITH_ROLLERS), jc.parameters(model)
+        found = {name: (low * float(now[name]), high * float(now[name])) for name, (low, high) in usual.items()}
+        return {name: bounds for name, bounds in found.items() if bounds[0] > 0}
 
     def read(name: str, text: str) -> Any:
         between = None if name in (SPEED, OIL) else _read(name, text, subject)

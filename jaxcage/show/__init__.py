@@ -135,7 +135,6 @@ from .quantity_tables import (
     displacements as displacements,
     head_of as head_of,
     impact_table as impact_table,
-    labels_at as labels_at,
     line_tables as line_tables,
     mean_over_starts as mean_over_starts,
     measures_table as measures_table,

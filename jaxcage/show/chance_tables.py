@@ -60,7 +60,7 @@ def _unknowns_table(found: Ensemble) -> Table:
         for u, unit, source in sorted(each, key=lambda row: -shares.get(row[0].label, 0.0))
     ]
     columns = [Column("value", ()), Column("range", ()), Column("of the verdict", (), "1", "%", key="share", digits=0)]
-    return rows_table("Unknown values", rows, [*columns, Column("measure", ())], "unknowns")
+    return rows_table("Unknown values", rows, columns, "unknowns")
 
 
 def range_words(found: Range, unit: str) -> str:
@@ -81,7 +81,7 @@ def chances_answer(found: Ensemble) -> str:
 
 
 def chances_notes(found: Ensemble) -> list[str]:
-    """How the draws were run, and what became of those that failed."""
+    """How the draws were run, what became of those that failed, and how to measure each unknown value."""
     length = f"{found.discard} revolutions left out, {found.revolutions} observed"
     notes = [f"One initial state for each draw, {length}: chaos that dies out later counts too."]
     if np.any(found.failed):
@@ -92,7 +92,7 @@ def chances_notes(found: Ensemble) -> list[str]:
             f"At {partly} of {found.rpm.size} speeds the verdict is that of the draws that could be computed. "
             "The rest are not like them, and more draws do not replace these: other steps may (--solver, --steps)."
         )
-    return notes
+    return [*notes, *(f"{u.label}: {source}" for u, source in zip(found.unknowns, found.sources, strict=True))]
 
 
 def measures_words(clues: Sequence[Clue]) -> str:

@@ -48,19 +48,19 @@ def before_and_after_table(title: str, rows: Sequence[BeforeAfter]) -> Table:
     return rows_table(title, records, columns, "before_and_after")
 
 
-def sobol_table(title: str, shares: SobolIndices, sources: Mapping[str, str] | None = None) -> Table:
-    """Share of the variance that each value has, alone and with the others; and how to measure it."""
+def sobol_table(title: str, shares: SobolIndices) -> Table:
+    """Share of the variance that each value has, alone and with the others."""
     rows = []
     for name in sorted(shares.total, key=lambda n: -shares.total[n]):
-        row: dict[str, Any] = {"value": name, "measure": (sources or {}).get(name)}
+        row: dict[str, Any] = {"value": name}
         for key, kind in (("alone", "first"), ("with the others", "total")):
             value, pair = getattr(shares, kind)[name], getattr(shares, f"{kind}_interval")[name]
             span = "not known" if any(map(math.isnan, pair)) else f"{pair[0]:+.2f} to {pair[1]:+.2f}"
             row |= {kind: value, f"{kind}_interval": pair, key: f"{value:+.2f} ({span})"}
         rows.append(row)
-    heads = ["value", "alone", "with the others", *([] if sources is None else ["measure"])]
     over = f"shares of the variance over {shares.evaluations} designs (95 %)"
-    return rows_table(f"{title}: {over}", rows, [Column(head, ()) for head in heads], "sobol")
+    columns = [Column(head, ()) for head in ("value", "alone", "with the others")]
+    return rows_table(f"{title}: {over}", rows, columns, "sobol")
 
 
 def budget_table(budget: ToleranceBudget, tolerance: float) -> Table:

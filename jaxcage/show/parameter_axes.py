@@ -40,14 +40,14 @@ class Axis:
         """Values in the unit in which they are shown."""
         return np.asarray(values) * factor(self.unit, SHOWN.get(self.unit, self.unit))
 
-    def told(self, values: Any) -> Any:
+    def told(self, values: np.ndarray) -> np.ndarray:
         """Values for a document: a speed in rpm, all else in SI units."""
         return self.shown(values) if self.name == SPEED else np.asarray(values)
 
     @property
-    def range(self) -> Any:
+    def range(self) -> np.ndarray:
         """The ends for a document."""
-        return self.told([self.lower, self.upper])
+        return self.told(np.array([self.lower, self.upper]))
 
 
 def parameter_axis(model: Any, name: str, lower: float | None = None, upper: float | None = None) -> Axis:

@@ -19,6 +19,8 @@ from .tables import SHOWN, Column, Table, rows_table, value_table
 
 SURE = 2.0
 """Standard errors by which two means must differ."""
+LONGEST = 60
+"""Characters of the words for a quantity in a table; longer ones give way to its name."""
 SHARES = ("cage_slip", "roller_slip_max")
 """Quantities without a unit that are read in per cent."""
 
@@ -54,18 +56,13 @@ def head_of(name: str, unit: str) -> str:
     return name.removesuffix("_" + unit.replace(" ", "_").replace("^", "").replace("/", "_per_")).replace("_", " ")
 
 
-def labels_at(found: xr.Dataset) -> list[str]:
-    """The labels at each speed, each once."""
-    return [" or ".join(sorted(set(row) - {"failed"}) or ["failed"]) for row in found["label"].values.tolist()]
-
-
 def quantities_table(title: str, found: xr.Dataset, names: Sequence[str]) -> Table:
-    """Means over the lanes that did not fail at each speed with their standard errors, and the labels."""
+    """Means over the lanes that did not fail at each speed, with their standard errors."""
     columns = [Column("speed [rpm]", found["rpm"].values.tolist(), key="speed_rpm", digits=0)]
     for name in names:
         (unit, shown), (mean, error) = unit_of(found, name), mean_over_starts(found, name)
         columns.append(Column(head_of(name, unit), mean.tolist(), unit, shown, error.tolist(), key=name))
-    return Table(title, [*columns, Column("motion", labels_at(found))])
+    return Table(title, columns, "means")
 
 
 def quantity_beside(name: str, cases: Sequence[str], found: Sequence[xr.Dataset]) -> Table:
@@ -73,7 +70,7 @@ def quantity_beside(name: str, cases: Sequence[str], found: Sequence[xr.Dataset]
     unit, shown = unit_of(found[0], name)
     pairs = [mean_over_starts(each, name) for each in found]
     (a, a_error), (b, b_error) = pairs
-    differs = np.abs(a - b) > SURE * np.nan_to_num(np.hypot(a_error, b_error))
+    differs = np.abs(a - b) > SURE * np.hypot(a_error, b_error)
     at = "shaft_rpm" if "shaft_rpm" in found[0].coords else "rpm"
     columns = [Column("shaft [rpm]", found[0][at].values.tolist(), digits=0)]
     for case, (mean, error) in zip(cases, pairs, strict=True):
@@ -84,7 +81,8 @@ def quantity_beside(name: str, cases: Sequence[str], found: Sequence[xr.Dataset]
 
 def measures_table(title: str, found: Measures) -> Table:
     """Quantities of one run with their standard errors."""
-    rows = [(quantity.text, value, quantity.unit) for quantity, value, _ in found.values()]
+    words = lambda q: q.text if len(q.text) <= LONGEST else head_of(q.name, q.unit)
+    rows = [(words(quantity), value, quantity.unit) for quantity, value, _ in found.values()]
     return value_table(title, rows, [error for _, _, error in found.values()])
 
 

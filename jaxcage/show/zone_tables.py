@@ -74,13 +74,13 @@ def beside_published(
         columns += speed_columns(end, f"{end}_rpm", beside, f"{end}_uncertainty_rpm", nothing="past range")
     columns += speed_columns("width", "width_rpm", None, nothing="open")
     columns += [] if published is None else [Column("published", ())]
-    missing = {None: "published but not found", -1: "published beyond the range"}
+    missing = {None: "Published, but not found", -1: "Published beyond this range"}
     notes = [f"{words}: {_words(partners[which])}" for which, words in missing.items() if which in partners]
-    return rows_table("; ".join([title, *notes]), rows, columns, key)
+    return rows_table("\n".join([title, *notes]), rows, columns, key)
 
 
 def zone_details(title: str, zones: Sequence[Zone], key: str = "") -> list[Table]:
-    """Mechanisms of the edges, share of chaotic initial states and mean life of chaos of each zone, if there are any."""
+    """Mechanisms of the edges, share of chaotic initial states and mean life of chaos of each zone, if any."""
     rows = [
         zone_record(zone) | {"zone": f"{i}: {zone_words(zone)}", "life": _life(zone)}
         for i, zone in enumerate(zones, start=1)
