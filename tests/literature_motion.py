@@ -9,8 +9,8 @@ import jax
 import jax.numpy as jnp
 import literature as table
 import numpy as np
-import xarray as xr
 import reference
+import xarray as xr
 from literature import Row, beside, row, share
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -119,7 +119,9 @@ def flows() -> Iterator[Row]:
         )
     )
     system = lambda rho: jc.ForcedSystem(law(rho), dimension=3)
-    found = _exponents(system(28.0), 2 * math.pi, (5.0, 5.0, 25.0), 64, 3, 256, 50, 500).exponents.values[0].mean(axis=0)
+    found = (
+        _exponents(system(28.0), 2 * math.pi, (5.0, 5.0, 25.0), 64, 3, 256, 50, 500).exponents.values[0].mean(axis=0)
+    )
     name = "Lorenz 10, 28, 8/3"
     yield from (
         beside(f"{name}, {n} exponent", theirs, x) for n, theirs, x in zip(ORDER, table.LORENZ, found, strict=True)
@@ -127,7 +129,11 @@ def flows() -> Iterator[Row]:
     yield row(f"{name}, sum", -41 / 3, found.sum(), 1e-4, table.TRACE)
     yield beside(f"{name}, dimension of Kaplan and Yorke", table.LORENZ_DIMENSION, 2 + found[0] / abs(found[2]))
     fixed = math.sqrt(8 / 3 * 19)
-    still = _exponents(system(20.0), 2 * math.pi, (fixed, fixed, 19.0), 2, 3, 256, 200, 500).exponents.values[0].mean(axis=0)
+    still = (
+        _exponents(system(20.0), 2 * math.pi, (fixed, fixed, 19.0), 2, 3, 256, 200, 500)
+        .exponents.values[0]
+        .mean(axis=0)
+    )
     decay = np.linalg.eigvals(np.array([[-10, 10, 0], [1, -1, -fixed], [fixed, fixed, -8 / 3]])).real
     yield row("Lorenz 10, 20, 8/3, largest exponent", decay.max(), still[0], 2e-3, table.EIGENVALUES)
     yield row("Lorenz 10, 20, 8/3, third exponent", decay.min(), still[2], 2e-3, table.EIGENVALUES)

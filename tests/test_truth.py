@@ -137,4 +137,6 @@ def test_forces_of_a_bearing_of_ones_own_are_those_of_the_reference():
     assert theirs.value("peak_contact_force") > 10
     assert ours.value("peak_contact_force") == pytest.approx(theirs.value("peak_contact_force"), rel=1e-2)
     assert ours.value("largest_eps") == pytest.approx(theirs.value("largest_eps"), abs=run.error)
-    assert np.isnan(ours.value("whirl_ratio")) and np.isnan(theirs.value("whirl_ratio"))  # a figure of eight, through its mean centre
+    assert np.isnan(ours.value("whirl_ratio")) and np.isnan(
+        theirs.value("whirl_ratio")
+    )  # a figure of eight, through its mean centre

@@ -84,11 +84,11 @@ def test_the_synchronous_force_of_a_known_one(run):
     time = theta / 400.0
     fx, fy = 7 * np.cos(theta - 0.3) + 2, 3 * np.sin(2 * theta)
     integrals = np.zeros_like(ran.integrals)
+    integrals[:, :2] = np.column_stack([ran.angle, time])
     running = lambda f: np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) / 2 * np.diff(time))])
     for name, f in (("x", fx), ("y", fy)):
         for part, wave in (("cos", np.cos(theta)), ("sin", np.sin(theta))):
             integrals[:, ran.beside.index(f"pocket_{name}_{part}")] = running(f * wave)
-    integrals[:, ran.beside.index("time")] = time
     found = measures(model, dataclasses.replace(ran, time=time, integrals=integrals))
     for name, force in (("synchronous_force_x_N", 7.0), ("synchronous_force_y_N", 0.0)):
         assert found[name].value == pytest.approx(force, rel=1e-9, abs=1e-9)

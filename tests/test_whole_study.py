@@ -24,9 +24,7 @@ def test_every_lane_is_in_its_place(order: tuple[str, ...], tmp_path: pathlib.Pa
     found = jc.study(BEARING, {name: values[name] for name in order}, store=store, lanes=3, starts=2, **LENGTH)
     assert found["cage_slip"].dims == (*order, "start") and not check_study(store).damaged
     assert found["speed"].attrs["long_name"] == "shaft speed"
-    swept = jc.sweep(
-        [jc.replace(BEARING, load=x) for x in values["load"]], values["speed"][::-1], starts=2, **LENGTH
-    )
+    swept = jc.sweep([jc.replace(BEARING, load=x) for x in values["load"]], values["speed"][::-1], starts=2, **LENGTH)
     errors = {"cage_slip": 1e-4, "friction_power_W": 1.0, "eccentricity_mean": 1e-3}
     mine = [found[n].transpose("load", "speed", "start").values.ravel() / e for n, e in errors.items()]
     theirs = [swept[n].values[:, ::-1].ravel() / e for n, e in errors.items()]

@@ -1,29 +1,34 @@
 """Sweeps of the whole bearing: lanes against single runs, exponents against two runs, failures, symmetry."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from test_whole_motion import SPEED, bearing
 
 import jaxcage as jc
-from jaxcage.models import rolling_start
-from jaxcage.solve import FINISHED, Lanes
+from jaxcage.models import INTEGRATED, bodies_of, rollers_of, rolling_start, state_scale
+from jaxcage.solve import FINISHED, NOT_FINITE, OUTSIDE, Lanes
 
 
 SHORT = {"discard": 0, "revolutions": 1, "blocks": 1}
-TIGHT = jc.native(1e-9, 1e-2)
-SIXTEENTH = 2 * np.pi / 16
 
 
-def an_eighth(model, states, tangents=None):
-    """Lanes of one bearing from states [SI] over an eighth of a revolution, with a tangent of each, by tight steps."""
-    lanes = Lanes.of([model], np.full(len(states), SPEED))
-    which, y = np.arange(len(states)), lanes.completed(np.stack(states))
-    scale, _ = lanes.begin(which, y)
-    engine = lanes.engine(0 if tangents is None else 1, TIGHT, samples=16)
-    how = {} if tangents is None else {"tangents": np.repeat(tangents[None, None], len(states), axis=0)}
-    ran = engine(lanes.numbers(engine, which), y, 2, 2, TIGHT, **how)
-    assert np.all(ran.mark == FINISHED)
-    return ran, scale[0, : model.dimension]
+def run_samples(model, states, samples, tolerance, direction=None, **more):
+    """Lanes of one bearing at one speed from sample to sample; their first states in units of the scale too."""
+    lanes, every = Lanes.of([model], np.full(len(states), SPEED)), np.arange(len(states))
+    y = np.array([[*state.row, *state.clock, *np.zeros(len(INTEGRATED))] for state in states])
+    y = y / lanes.begin(every, y)[0]
+    method, tangents = jc.native(tolerance), None
+    if direction is not None:
+        tangents = np.tile(direction, (len(y), 1, 1))
+    engine = lanes.engine(0 if direction is None else 1, method, 16)
+    numbers = lanes.numbers(engine, every)
+    return engine(numbers, y, samples, samples, method, tangents=tangents, **{"step": 1e-4} | more), y
+
+
+def in_units(model, state):
+    """A state over its magnitudes, in one row as the engine has it."""
+    return np.asarray(state.row) / np.asarray(state_scale(model, jnp.asarray(SPEED)).row)
 
 
 @pytest.fixture(scope="module")
@@ -32,32 +37,83 @@ def start():
     return jc.simulate(bearing(), SPEED, revolutions=1, samples=32).last
 
 
+def along():
+    """A direction of tangent vectors, in units of the state."""
+    return np.random.default_rng(1).normal(size=5 * 13 + 9)
+
+
 @pytest.mark.wide
 def test_a_lane_is_a_simulation(start):
     """From one state over an eighth of a revolution, both by tight steps."""
     model = bearing()
-    others = (rolling_start(model, SPEED, 1), rolling_start(model, SPEED))
-    ran, scale = an_eighth(model, [s.row for s in (start, *others)])
-    run = jc.simulate(model, SPEED, revolutions=1, samples=32, start=start, method=TIGHT)
-    dim, k = model.dimension, 4
-    moved = np.abs((run.state[k] - run.state[0]) / scale).max()
-    apart = np.abs((ran.state[0, :dim] - run.state[k]) / scale).max()
-    assert run.outcome == "successful" and apart < 1e-5 < 1e-2 < moved
-    np.testing.assert_allclose(ran.state[0, dim + 2 :], run.integrals[k, 2:], rtol=1e-6, atol=1e-9)
+    ran, _ = run_samples(model, [start, rolling_start(model, SPEED, 1), rolling_start(model, SPEED)], 2, 1e-9, along())
+    run = jc.simulate(model, SPEED, revolutions=1, samples=32, start=start, method=jc.native(1e-9, 1e-2))
+    assert np.all(ran.mark == FINISHED) and run.outcome == "successful"
+    unit = np.asarray(state_scale(model, SPEED).row)
+    moved = np.abs(run.state[4] / unit - in_units(model, start)).max()
+    assert np.abs(ran.strobe[0, :, :74] - run.state[2:5:2] / unit).max() < 1e-5 < 1e-2 < moved
+    angle, seconds, *integrals = ran.state[0, 74:]
+    assert angle == pytest.approx(float(run.angle[4]), abs=1e-12) and seconds == pytest.approx(run.time[4], rel=1e-8)
+    np.testing.assert_allclose(integrals, run.integrals[4, 2:] - run.integrals[0, 2:], rtol=1e-6, atol=1e-9)
+    largest = ran.peaks[0].max(axis=0)
+    np.testing.assert_allclose(largest[1:4], run.peaks[:4].max(axis=0)[1:4], rtol=1e-3)
+
+
+@pytest.mark.wide
+def test_rates_in_machine_code_are_those_of_the_model(start):
+    """A step so short that it is the rate: beside the field that JAX evaluates."""
+    model, h = bearing(), 1e-7
+    states = [start, rolling_start(model, SPEED, 1)]
+    ran, y = run_samples(model, states, 1, 1e-3, step=h, turn=h)
+    found = ran.state[:, :74]
+    rates = [model.at_speed(jnp.asarray(SPEED)).rates(s) for s in states]
+    for row, before, rate in zip(found, y, rates, strict=True):
+        expected = in_units(model, rate.state) / abs(float(rate.state.clock[0]))
+        np.testing.assert_allclose((row - before[:74]) / h, expected, rtol=0, atol=1e-4 * np.abs(expected).max())
 
 
 @pytest.mark.wide
 def test_growth_is_that_of_the_distance_of_two_runs(start):
     """Over an eighth of a revolution, the logarithm of the tangent's length against runs a little apart."""
-    model, little = bearing(), 1e-7
-    direction = np.random.default_rng(1).normal(size=model.dimension)
-    scale = np.asarray([float(x) for x in model.scale(SPEED)])
-    row = np.asarray(start.row)
-    ran, scale = an_eighth(model, [row + sign * little * direction * scale for sign in (0, 1, -1)], direction)
-    apart = np.linalg.norm((ran.state[1] - ran.state[2])[: model.dimension] / scale)
+    model, direction, little = bearing(), along(), 1e-7
+    unit = np.asarray(state_scale(model, SPEED).row) * little * direction
+    moved = lambda sign: start._replace(
+        rollers=start.rollers + sign * rollers_of(unit), bodies=start.bodies + sign * bodies_of(unit)
+    )
+    ran, _ = run_samples(model, [start, moved(1), moved(-1)], 2, 1e-9, direction)
+    apart = np.linalg.norm(ran.state[1, :74] - ran.state[2, :74])
     expected = np.log(apart / (2 * little * np.linalg.norm(direction)))
     assert abs(expected) > 0.1
     assert ran.growth[0].sum() - np.log(np.linalg.norm(direction)) == pytest.approx(expected, abs=2e-3)
+
+
+@pytest.mark.wide
+def test_a_lane_that_fails_leaves_its_neighbours_as_they_are(start):
+    """Beside a cage that hardly turns, and one that starts with no number, a lane is bit for bit what it is alone."""
+    model = bearing()
+    stalled = rolling_start(model, SPEED, turning=0.01)
+    broken = start._replace(rollers=start.rollers.at[1, 4].set(jnp.nan))
+    ran, alone = (
+        run_samples(model, [start, *others], 1, 1e-5, along())[0] for others in ((stalled, broken), (start, start))
+    )
+    assert list(ran.mark) == [FINISHED, OUTSIDE, NOT_FINITE]
+    np.testing.assert_array_equal(ran.state[0], alone.state[0])
+    assert ran.growth[0] == alone.growth[0] and np.isfinite(ran.growth[0])
+
+
+@pytest.mark.wide
+def test_rollers_have_no_names():
+    """With a balanced cage, a start with its rollers and its angle moved on by one pocket is the same motion."""
+    model = bearing(eccentricity=0.0)
+    start, turn = rolling_start(model, SPEED, 1), 2 * np.pi / 13
+    renamed = lambda state: state._replace(rollers=jnp.roll(state.rollers, -1, axis=1))
+    rolled = renamed(start)._replace(clock=start.clock + jnp.asarray([turn, 0.0]))
+    ran, _ = run_samples(model, [start, rolled, start], 1, 1e-6, along())
+    one, other = (row[:74].copy() for row in ran.state[:2])
+    moved = np.concatenate([np.roll(one[:65].reshape(13, 5), -1, axis=0).ravel(), one[65:]])
+    assert np.abs(moved - other).max() < 1e-8
+    assert np.abs(one - other).max() > 1e-3
+    np.testing.assert_allclose(ran.peaks[0, 0], ran.peaks[1, 0], rtol=1e-6)
 
 
 @pytest.mark.wide
@@ -65,6 +121,21 @@ def test_slow_shafts_run_through():
     """At 1000 rpm a sixteenth of a revolution takes 9 ms, in which neighbouring motions diverge by a factor of 100."""
     found = jc.sweep(bearing(), jc.rpm(1000.0), starts=1, discard=1, revolutions=1, blocks=1)
     assert found.outcome.item() == "successful" and found.error.item() < 0.05 and found.exponents.item() > 50
+
+
+@pytest.mark.wide
+def test_exponents_of_the_last_revolutions():
+    """Followed over four of 16, all else over all; means are those of a run that follows them from the beginning."""
+    options = dict(starts=1, discard=0, revolutions=16, blocks=16, method=jc.native(1e-4, 1e-2))
+    few = jc.sweep(bearing(), SPEED, exponent_revolutions=4, **options)
+    every = jc.sweep(bearing(), SPEED, exponent_revolutions=16, **options)
+    assert (few.sizes["growth_block"], every.sizes["growth_block"]) == (4, 16)
+    assert few.sizes["block"] == every.sizes["block"] == 16
+    late = every.block_growth.values[..., 4:, 0]
+    assert few.exponents.item() == pytest.approx(late.mean(), abs=4 * late.std() / np.sqrt(4))
+    assert few.friction_power_W.item() == pytest.approx(every.friction_power_W.item(), rel=0.05)
+    with pytest.raises(ValueError, match="exponent_revolutions"):
+        jc.sweep(bearing(), SPEED, exponent_revolutions=0, **options)
 
 
 @pytest.fixture(scope="module")

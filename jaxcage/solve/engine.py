@@ -40,10 +40,10 @@ FEWEST_STEPS, MOST_STEPS, MOST_AT = 4, 20_000.0, 1e-6
 The second is for tolerances from the third on; smaller ones take more steps."""
 SMALLEST_STEP = 1e-10
 """Step below which a lane is given up [rad]."""
-BEARING_STEPS = (REVOLUTION / 20_000, REVOLUTION / 200, REVOLUTION / 4e6)
+BEARING_STEPS = (REVOLUTION / 20_000, REVOLUTION / 200, REVOLUTION / 4e9)
 """First, longest and shortest step of a whole bearing [rad of the cage]."""
-BEARING_MOST = 80_000.0
-"""Most steps of a whole bearing in a revolution, in the mean; more with slow shafts."""
+BEARING_MOST = 5_000.0
+"""Most steps of a whole bearing from strobe to strobe, or in a sixteenth of a revolution; more with slow shafts."""
 TIME_STEPS, TIME_MOST = (1e-5, 1.0, 1e-10), 200_000.0
 """The same over time, in units of the time from strobe to strobe; most steps in that time."""
 LARGEST_WRITTEN_OUT = 64
@@ -75,7 +75,7 @@ class Runner:
         strobes: int,
         keep: int,
         settings: Float[np.ndarray, " 4"],
-        step: Float[np.ndarray, " lanes"] | float,
+        step: Float[np.ndarray, " lanes"],
         tangents: Float[np.ndarray, "lanes tangents dim"] | None,
         threads: int,
         report: Callable[[int], None],
@@ -182,7 +182,8 @@ class Engine:
         if width not in self._runners:
             self._runners[width] = Runner(self.field, self._pair, width)
         settings = np.array([method.tolerance, *limits])
-        step = first if step is None else np.where(np.isnan(step), first, step)
+        given = np.broadcast_to(np.nan if step is None else step, len(state))
+        step = np.where(np.isnan(given), first, given)
         return self._runners[width](numbers, state, strobes, keep, settings, step, tangents, threads, report)
 
     def _limits(self, numbers: Any, turn: float, tolerance: float) -> tuple[float, float, float, float]:
@@ -196,7 +197,7 @@ class Engine:
         wide, shared = iter(numbers[0][SAMPLED:]), iter(numbers[1])
         at, _, scale = self.numbers.form.filled([next(wide if w else shared) for w in self.numbers.wide])
         slow = float(np.max(slowness(*map(np.asarray, (scale[2], scale[3], at.rolling_cage_speed)))))
-        return *BEARING_STEPS, BEARING_MOST * turn / REVOLUTION * slow * more
+        return *BEARING_STEPS, BEARING_MOST * max(1.0, 16 * turn / REVOLUTION) * slow * more
 
 
 def _run_threads(run: Callable[[], None], count: int, queue: np.ndarray, report: Callable[[], None]) -> None:

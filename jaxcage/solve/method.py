@@ -188,7 +188,9 @@ class BesideField(AbstractField):
         return rates, beside
 
     def linearise(self, tau: Scalar, y: Any) -> AbstractLinearisation:
-        raise ArgumentError("method", said="must be `method(solver, tolerance=...)` of diffrax for a whole bearing.")
+        raise ArgumentError(
+            "method", said="must be explicit for a whole bearing, such as `native()`, but is a Rosenbrock method."
+        )
 
     def watch(self, y: Any) -> Array:
         """Values of the quantities that are watched."""

@@ -68,7 +68,7 @@ class Trajectory:
     integration has made."""
     beside: tuple[str, ...] = ()
     """Names of the quantities that are integrated beside the state."""
-    integrals: Float[np.ndarray, "recorded beside"] = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+    integrals: Float[np.ndarray, "points beside"] = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
     """Their values from the beginning [SI]."""
     watched: tuple[str, ...] = ()
     """Names of the quantities whose largest values are recorded."""
