@@ -105,7 +105,7 @@ def _averaged(found: Found) -> list[tuple[Quantity, np.ndarray, np.ndarray]]:
     if not model.quantities:
         return []
     numbers = over_lanes(lanes, np.arange(len(found.scale)), lambda model, speed: model.reference(speed))
-    given = model.beside, model.watched[1:], seen.integrals, seen.largest, numbers, found.run.block
+    given = model.beside, model.watched[1:], seen.integrals, seen.largest, numbers, float(found.run.block)
     return averaged(model.quantities, *given)
 
 

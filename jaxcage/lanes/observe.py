@@ -335,7 +335,7 @@ def centres_of(
 
 
 def _centres(model: Any, speed: Array, states: Array) -> Array:
-    return jax.vmap(lambda y: jnp.stack(model.centre(tuple(y))))(states)
+    return jax.vmap(lambda y: jnp.stack(model.centre(y if model.beside else tuple(y))))(states)
 
 
 def start_tangents(dimension: int, exponents: int) -> Float[np.ndarray, "exponents dim"]:
