@@ -22,7 +22,7 @@ from jaxcage.files import (
     with_ranges,
     write_template,
 )
-from jaxcage.show import chances_notes
+from jaxcage.show import chances_answer
 
 
 STIFF = Unknown("support.stiffness", ("stiffness_x", "stiffness_y"), Range(1e4, 1e6))
@@ -90,7 +90,7 @@ def test_what_is_not_decided_says_what_to_measure():
     assert found.chance == pytest.approx([1.0, 0.4, 0.4, 0.0], abs=0.02)
     first, second = found.clues()
     assert first.label == "support.stiffness" and first.share > 0.5 > 0.1 > second.share
-    assert "Measure support.stiffness (tap the cage)" in chances_notes(found)[0]
+    assert "Measure support.stiffness (tap the cage)" in chances_answer(found)
 
 
 def test_verdicts_and_lanes_that_failed():

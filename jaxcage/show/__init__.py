@@ -172,7 +172,6 @@ from .tables import (
     rows_table as rows_table,
     shares_table as shares_table,
     speed_columns as speed_columns,
-    table as table,
     value_table as value_table,
 )
 from .zone_tables import (

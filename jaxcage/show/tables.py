@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 
 SHOWN = {"m": "mm", "rad/s": "rpm", "rad": "deg", "1": ""}
@@ -142,23 +141,6 @@ class Table:
         first = lambda line: f"{line[0]:<{widths[0]}}"
         rest = lambda line: [f"{cell:>{width}}" for cell, width in zip(line[1:], widths[1:], strict=True)]
         return "\n".join([self.title, *("  ".join([first(line), *rest(line)]).rstrip() for line in lines)])
-
-
-def table(title: str, found: xr.Dataset, columns: Mapping[str, str | Column], errors: Mapping[str, str] = {}) -> Table:
-    """Variables of a data set along one axis as a table.
-
-    **Arguments:** title; a data set of one axis; columns as name of the variable -> head (its unit is that of the data
-    set), or name -> a column of one's own; variable -> the variable that holds its standard error.
-    """
-    made = []
-    for name, head in columns.items():
-        if isinstance(head, Column):
-            made.append(head)
-            continue
-        values = found[name]
-        deviation = found[errors[name]].values.tolist() if name in errors else None
-        made.append(Column(head, values.values.tolist(), values.attrs.get("units", "1"), errors=deviation, key=name))
-    return Table(title, made)
 
 
 def rows_table(
