@@ -72,7 +72,7 @@ def averaged(
     integrals: Float[np.ndarray, "lanes blocks beside"],
     largest: Float[np.ndarray, "lanes blocks watched"],
     numbers: Mapping[str, Float[np.ndarray, " lanes"]],
-    block: float,
+    block: float | int,
 ) -> list[tuple[Quantity, Float[np.ndarray, " lanes"], Float[np.ndarray, "lanes blocks"]]]:
     """Each quantity with its value over the whole of a run and in each block of it.
 
