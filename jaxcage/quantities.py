@@ -21,7 +21,7 @@ class Averages:
     largest: Mapping[str, np.ndarray]
     numbers: Mapping[str, np.ndarray]
     """Numbers of each lane that quantities refer to, as the model's `reference` gives them."""
-    revolutions: float
+    revolutions: float | int
     """Length of a stretch in revolutions."""
 
     def mean(self, name: str) -> np.ndarray:
