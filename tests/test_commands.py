@@ -62,7 +62,7 @@ def test_a_simulation_that_fails_says_so(capsys: pytest.CaptureFixture[str], tmp
     arguments = ["--speed", "2500", "--solver", "rk4", "--steps", "8", "--out", str(tmp_path)]
     assert main(["simulate", "1a", *arguments]) == 1
     out, err = capsys.readouterr()
-    assert out == "" and "The simulation at 2500 rpm failed (" in err and not any(tmp_path.iterdir())
+    assert out == "" and "The simulation at 2500 rpm of the cage" in err and not any(tmp_path.iterdir())
 
 
 def test_statics(capsys: pytest.CaptureFixture[str], tmp_path: Path):

@@ -111,7 +111,7 @@ def impact(
         raise InputError(f"The pocket clearance of {subject.name} must be above 0 for an impact, but it is 0.")
     with show.computing(f"impact {subject.name}"):
         v0 = jc.forces.approach_speed(law.approach_ratio, at, bearing.pocket_clearance)
-        found = jc.forces.impact_history(law, bearing.roller_mass, v0, np.asarray(1e-3 * duration))
+        found = jc.forces.impact_history(law, bearing.roller_mass, v0, 1e-3 * duration)
     where, stem = f"{subject.name}, {subject.at(at)}", f"_{speed:g}rpm"
     table, values = jc.show.impact_table(f"Impact in {where}", found, float(v0))
     units = {"time": "s", "contact_force": "N", "bar_force": "N", "roller_position": "m", "bar_position": "m"}

@@ -58,7 +58,7 @@ class Subject:
 
     def _other(self, speed: Any) -> Any:
         """The speed that goes with the model's, both in rpm."""
-        return np.asarray(self.model.other_speed(speed / RPM)[1]) * RPM
+        return np.vectorize(lambda own: float(self.model.other_speed(float(jc.rpm(own)))[1]) * RPM)(speed)
 
     @property
     def shaft(self) -> float | None:
@@ -87,7 +87,11 @@ class Subject:
         return given / slope / RPM
 
     def speed(self, given: float | None, option: str = "speed") -> float:
-        """The speed of the model [rad/s] that an option means, by the model's own relation of cage and shaft.
+        """The speed of the model [rad/s] that an option means."""
+        return jc.rpm(self._rpm(given, option))
+
+    def _rpm(self, given: float | None, option: str) -> float:
+        """The speed of the model [rpm] that an option means, by the model's own relation of cage and shaft.
 
         **Raises:** `InputError` for no speed, and for one at which no cage runs.
         """
@@ -110,19 +114,18 @@ class Subject:
                 f"{jc.models.FASTEST:g} m/s at its land, but {cage:g} rpm of the cage were given; speeds of the shaft "
                 'are written "20000 rpm shaft".'
             )
-        return speed / RPM
+        return speed
 
     def range(self, over: Range, count: int) -> Any:
         """Evenly spaced speeds of the model [rad/s], `count` if none are asked for; of one only the first.
 
         **Raises:** `InputError` for a range that does not ascend.
         """
-        low, high = self.speed(over.first, "first"), self.speed(over.last, "last")
-        count = over.count or count
+        low, high, count = self._rpm(over.first, "first"), self._rpm(over.last, "last"), over.count or count
         if count > 1 and high <= low:
-            between = f"{low * RPM:g} to {high * RPM:g} rpm of the {self.own}"
+            between = f"{low:g} to {high:g} rpm of the {self.own}"
             raise InputError(f"Option --last must be above --first, but the range is {between}.")
-        return np.linspace(low, high, count) if count > 1 else np.array([low])
+        return jc.rpm(low, high, count)
 
     def require_orbits(self, command: str) -> None:
         """**Raises:** `InputError` for a model whose revolutions do not repeat."""

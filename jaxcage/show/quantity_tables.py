@@ -42,7 +42,7 @@ def mean_over_starts(found: xr.Dataset, name: str) -> tuple[Float[np.ndarray, " 
         known = row[~lost[i]]
         means.append(float(np.mean(known)) if known.size else math.nan)
         rest = np.zeros(0) if blocks is None else blocks[i][~lost[i]].ravel()
-        errors.append(float(scatter(rest)) if rest.size > 1 else math.nan)
+        errors.append(float(scatter(rest[None])[0]) if rest.size > 1 else math.nan)
     return np.array(means), np.array(errors)
 
 
