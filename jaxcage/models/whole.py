@@ -17,8 +17,16 @@ from .._errors import ArgumentError
 from .._form import compiled
 from .._parameters import choice, parameter
 from .._types import Scalar
-from ..bearing import Bearing, Lubricant, brass, line_contact_approach, load_distribution, nu2310, vg
-from ..bearing.line_contact import raceway_loads_of_all
+from ..bearing import (
+    Bearing,
+    Lubricant,
+    brass,
+    line_contact_approach,
+    load_distribution,
+    nu2310,
+    raceway_loads_of_all,
+    vg,
+)
 from ..forces import Land, LandContact, RibFilm
 from .cage import FASTEST
 from .contacts import (

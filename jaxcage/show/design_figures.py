@@ -34,7 +34,7 @@ from .style import (
 
 
 if TYPE_CHECKING:
-    from ..design import MeanGradient, BeforeAfter, Optimised
+    from ..design import BeforeAfter, MeanGradient, Optimised
 
 
 FIRST = ("guidance_gap", "eccentricity")
