@@ -24,6 +24,7 @@ from pathlib import Path
 
 import cma
 import numpy as np
+import xarray as xr
 from scipy.stats import qmc
 
 import jaxcage as jc
@@ -197,7 +198,7 @@ class Search:
     def _scores_together(self, places: np.ndarray) -> np.ndarray:
         unknowns, cases = self.ledger.unknowns, len(self.models)
         values = [{u.name: u.value(p) for u, p in zip(unknowns, place, strict=True)} for place in places]
-        swept = jc.sweep_designs(
+        swept = jc.sweep(
             [with_values(model, unknowns, chosen) for chosen in values for model in self.models.values()],
             self.speeds,
             starts=self.starts,
@@ -211,22 +212,23 @@ class Search:
         )
         scores = []
         for i, chosen in enumerate(values):
-            own = zip(self.models, swept[i * cases : (i + 1) * cases], strict=True)
-            by_case = {name: self._wrong(PUBLISHED_CASES[name], found) for name, found in own}
+            own = enumerate(self.models, start=i * cases)
+            by_case = {name: self._wrong(PUBLISHED_CASES[name], swept.isel(design=k)) for k, name in own}
             off = list(by_case.values())
             scores.append(float(np.mean(off) + 0.5 * np.max(off)))
             self._tell(scores[-1], by_case, chosen)
         return np.array(scores)
 
-    def _wrong(self, case: PublishedCase, found: jc.Sweep) -> float:
+    def _wrong(self, case: PublishedCase, found: xr.Dataset) -> float:
         """Mean relative error of the edges of a case, were each wrong speed due to one that has moved; each needless
         change between calm and chaos costs `NEEDLESS` besides. Chaos counts by how much of the way to the horizon it
         lasts, and a lane that failed is wrong whatever it should do.
         """
-        rpm = found.rpm
+        rpm = found.rpm.values
         should = (rpm >= case.zone_1_onset_rpm) & (rpm <= case.zone_1_exit_rpm) | (rpm >= case.zone_2_onset_rpm)
-        lasted = 1.0 if found.escape is None else np.minimum(found.escape, found.horizon) / found.horizon
-        level = np.clip((found.exponents[..., 0] - CHAOS_THRESHOLD) / (2 * SOFT) + 0.5, 0, 1)
+        horizon = found.horizon
+        lasted = np.minimum(found.escape.values, horizon) / horizon if horizon else 1.0
+        level = np.clip((found.exponents.values[..., 0] - CHAOS_THRESHOLD) / (2 * SOFT) + 0.5, 0, 1)
         chaos = (lasted * level).max(axis=1)
         chaos = np.where(np.isfinite(chaos), chaos, 1.0 - should)
         needless = np.sum(np.abs(np.diff(chaos))) - np.sum(np.abs(np.diff(should.astype(float))))

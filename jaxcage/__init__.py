@@ -1,20 +1,18 @@
 """Differentiable dynamics of rolling-bearing cages.
 
-| layer        | responsibility                                                                      |
-|--------------|-------------------------------------------------------------------------------------|
-| `bearing`    | geometry, materials, lubricant, kinematics, statics, catalogue, published cases     |
-| `forces`     | rib film, land contact, pocket impact, support, unbalance, gravity: one law a file  |
-| `models`     | the forced-system protocol, the cage in its rib                                     |
-| `solve`      | many lanes in machine code or by diffrax; time histories, the strobe map            |
-| `analysis`   | strobe sections, exponents, labels, zones, spectra, stability, measures             |
-| `sweeps`     | lanes in chunks on all cores; sweeps over speed; run-up and run-down                |
-| `orbits`    | periodic orbits, branches, bifurcation points and their derivatives                 |
-| `design`    | constants identified from edges; objectives, optimisation, tolerances               |
-| `files`      | TOML in and out, units                                                              |
-
-| `studies`    | sweeps over any parameters, stored as they go; maps of labels                       |
-| `report`     | tables of what was found; one HTML page about a design                              |
-| `cli`        | the `jaxcage` command                                                               |
+| layer      | responsibility                                                                       |
+|------------|--------------------------------------------------------------------------------------|
+| `bearing`  | geometry, materials, lubricant, kinematics, statics, catalogue, published cases       |
+| `forces`   | rib film, land contact, pocket impact, support, unbalance, gravity: one law a file    |
+| `models`   | the forced-system protocol; the cage in its rib, the whole bearing, oscillators       |
+| `files`    | TOML in and out, units, safe writing                                                 |
+| `solve`    | the engine: many lanes in machine code or by diffrax; time histories, the strobe map  |
+| `analysis` | exponents, labels, zones, spectra, survival of chaos, stability, measures             |
+| `lanes`    | plans of lanes, their runs, the data set of a run; sweeps, studies, maps              |
+| `orbits`   | periodic orbits, branches, bifurcation points and their derivatives                  |
+| `design`   | objectives, statistics with gradients, optimisation, tolerances, identified constants |
+| `show`     | figures, tables, columns of numbers, the HTML page                                   |
+| `cli`      | the `jaxcage` command                                                                |
 
 SI units inside, always; y points up and rotation is positive counter-clockwise.
 """

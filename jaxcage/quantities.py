@@ -21,7 +21,7 @@ class Averages:
     largest: Mapping[str, np.ndarray]
     numbers: Mapping[str, np.ndarray]
     """Numbers of each lane that quantities refer to, as the model's `reference` gives them."""
-    revolutions: float
+    revolutions: float | int
     """Length of a stretch in revolutions."""
 
     def mean(self, name: str) -> np.ndarray:
@@ -72,7 +72,7 @@ def averaged(
     integrals: Float[np.ndarray, "lanes blocks beside"],
     largest: Float[np.ndarray, "lanes blocks watched"],
     numbers: Mapping[str, Float[np.ndarray, " lanes"]],
-    block: float,
+    block: float | int,
 ) -> list[tuple[Quantity, Float[np.ndarray, " lanes"], Float[np.ndarray, "lanes blocks"]]]:
     """Each quantity with its value over the whole of a run and in each block of it.
 

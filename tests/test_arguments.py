@@ -33,8 +33,7 @@ unwrap = inspect.unwrap
         (lambda: jc.sweep(DUFFING, ["a", "b"]), "`speeds` must be a number or an array of numbers"),
         (lambda: jc.sweep(DUFFING, np.array(["2020"], dtype="datetime64[Y]")), "of real numbers"),
         (lambda: jc.sweep(DUFFING, SPEEDS, starts=[(1.0,)]), "states of 2 numbers"),
-        (lambda: jc.sweep("1a", SPEEDS), "`system` must be of kind AbstractForcedSystem, but '1a' was given"),
-        (lambda: jc.sweep_designs(DUFFING, SPEEDS), "`systems` must be a row of things"),
+        (lambda: jc.sweep("1a", SPEEDS), "`model` must be of kind AbstractForcedSystem, but '1a' was given"),
         (lambda: jc.simulate(DUFFING, 1e300, revolutions=2), "`speed` must be positive and finite, at most"),
         (lambda: jc.simulate(DUFFING, 1.0, revolutions=1, start=(np.nan, 0.0)), r"finite numbers, but \(nan, 0.0\)"),
         (lambda: jc.periodic_orbit(DUFFING, 1.0, method="rk4"), "`method` must be of kind AbstractMethod, but 'rk4'"),
@@ -92,7 +91,7 @@ def exponent(gap):
     ids=["grad of a sweep", "vmap of a simulation"],
 )
 def test_what_steers_by_its_findings_says_what_to_call_instead(run):
-    with pytest.raises(ValueError, match="must be known numbers, but are traced by .*`jaxcage.sweep_designs"):
+    with pytest.raises(ValueError, match="must be known numbers, but are traced by .*`jaxcage.sweep"):
         run()
 
 
@@ -121,7 +120,7 @@ ENTRIES: dict[str, Callable[[], Any]] = {
     "simulate": lambda: jc.simulate(DUFFING, 1.0, revolutions=1),
     "study": lambda: jc.study(DUFFING, {"speed": SPEEDS}, store="nowhere", name="duffing", version="1"),
     "sweep": lambda: jc.sweep(DUFFING, SPEEDS),
-    "sweep_bearing": lambda: jc.sweep_bearing(WHOLE, 1000.0),
+    "sweep of a whole bearing": lambda: jc.sweep(WHOLE, 1000.0),
 }
 
 

@@ -134,23 +134,6 @@ def test_kernels_give_the_strobe_map_and_its_derivative(name):
     assert np.all(peak >= 0)
 
 
-# --- monodromy matrices -------------------------------------------------------------------------------------------
-
-
-@pytest.mark.wide
-def test_monodromy_of_bad_shapes_and_failed_lanes():
-    with pytest.raises(ValueError, match="4 numbers for each of the 6 speeds"):
-        jc.lanes.monodromy(MODEL, SPEEDS, STATES[:, :3])
-    states = STATES.copy()
-    states[1] = np.nan
-    image, matrix = jc.lanes.monodromy(MODEL, SPEEDS, states)
-    assert np.all(np.isnan(image[1])) and np.all(np.isnan(matrix[1]))
-    others = [0, 2, 3, 4, 5]
-    good = jc.lanes.monodromy(MODEL, SPEEDS, STATES)
-    np.testing.assert_array_equal(image[others], good[0][others])
-    np.testing.assert_array_equal(matrix[others], good[1][others])
-
-
 # --- error control ------------------------------------------------------------------------------------------------
 
 

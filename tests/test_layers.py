@@ -9,7 +9,7 @@ import jaxcage
 
 
 ROOT = pathlib.Path(jaxcage.__file__).parent
-LAYERS = ("bearing forces models solve integrate analysis sweeps orbits design io studies plotting report cli").split()
+LAYERS = "bearing forces models files solve analysis lanes orbits design show cli".split()
 FILES = sorted(p for layer in LAYERS for p in (ROOT / layer).rglob("*.py"))
 
 

@@ -6,6 +6,7 @@ import pytest
 from test_whole_motion import SPEED, bearing
 
 import jaxcage as jc
+from jaxcage.lanes import Plan, Run, run_lanes
 from jaxcage.models import INTEGRATED, bodies_of, rollers_of, rolling_start, state_scale
 from jaxcage.solve import FINISHED, NOT_FINITE, OUTSIDE, Lanes
 
@@ -126,16 +127,15 @@ def test_slow_shafts_run_through():
 @pytest.mark.wide
 def test_exponents_of_the_last_revolutions():
     """Followed over four of 16, all else over all; means are those of a run that follows them from the beginning."""
-    options = dict(starts=1, discard=0, revolutions=16, blocks=16, method=jc.native(1e-4, 1e-2))
-    few = jc.sweep(bearing(), SPEED, exponent_revolutions=4, **options)
-    every = jc.sweep(bearing(), SPEED, exponent_revolutions=16, **options)
+    options = dict(discard=0, revolutions=16, blocks=16, method=jc.native(1e-4, 1e-2))
+    model = bearing()
+    followed = lambda n: run_lanes(Plan.over_speed(model, SPEED, 1), Run.of(model, exponent_revolutions=n, **options))
+    few, every = followed(4), followed(16)
     assert (few.sizes["growth_block"], every.sizes["growth_block"]) == (4, 16)
     assert few.sizes["block"] == every.sizes["block"] == 16
     late = every.block_growth.values[..., 4:, 0]
     assert few.exponents.item() == pytest.approx(late.mean(), abs=4 * late.std() / np.sqrt(4))
     assert few.friction_power_W.item() == pytest.approx(every.friction_power_W.item(), rel=0.05)
-    with pytest.raises(ValueError, match="exponent_revolutions"):
-        jc.sweep(bearing(), SPEED, exponent_revolutions=0, **options)
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,7 @@ from .._errors import ArgumentError
 from .._form import compiled
 from .._notebook import notebook_html
 from ..forces import Force
-from ..models import FORCES, AbstractForcedSystem, CageModel
-from ..models.cage_quantities import QUANTITIES, CageHistory
+from ..models import CAGE_QUANTITIES, FORCES, AbstractForcedSystem, CageHistory, CageModel
 from ..quantities import Quantity, averaged
 from ..solve import Trajectory
 from .labels import scatter
@@ -159,7 +158,7 @@ def measures(model: AbstractForcedSystem, trajectory: Trajectory) -> Measures:
     if model.beside:
         return _from_integrals(model, trajectory)
     history = cage_history(model, trajectory)  # pyright: ignore[reportArgumentType]
-    return Measures({q.name: Measured(q, float(q.of(history)), np.nan) for q in QUANTITIES if q.of is not None})
+    return Measures({q.name: Measured(q, float(q.of(history)), np.nan) for q in CAGE_QUANTITIES if q.of is not None})
 
 
 def _from_integrals(model: AbstractForcedSystem, trajectory: Trajectory) -> Measures:

@@ -24,6 +24,7 @@ from .cage import (
     CageModel as CageModel,
     fastest_speed as fastest_speed,
 )
+from .cage_quantities import CAGE_QUANTITIES as CAGE_QUANTITIES, CageHistory as CageHistory
 from .cases import CONSTANTS as CONSTANTS, Constants as Constants, case as case
 from .contacts import (
     Pockets as Pockets,

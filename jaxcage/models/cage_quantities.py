@@ -93,7 +93,7 @@ def winding(
     return float(turned[-1] - turned[0]), int(np.sum(doubted))
 
 
-QUANTITIES = (
+CAGE_QUANTITIES = (
     Quantity(
         "whirl_ratio",
         "",

@@ -17,8 +17,16 @@ from .._errors import ArgumentError
 from .._form import compiled
 from .._parameters import choice, parameter
 from .._types import Scalar
-from ..bearing import Bearing, Lubricant, brass, line_contact_approach, load_distribution, nu2310, vg
-from ..bearing.line_contact import raceway_loads_of_all
+from ..bearing import (
+    Bearing,
+    Lubricant,
+    brass,
+    line_contact_approach,
+    load_distribution,
+    nu2310,
+    raceway_loads_of_all,
+    vg,
+)
 from ..forces import Land, LandContact, RibFilm
 from .cage import FASTEST
 from .contacts import (
@@ -203,7 +211,7 @@ class BearingModel(AbstractForcedSystem):
     def other_speed(self, speed: Scalar) -> tuple[str, Scalar]:
         return "cage speed in pure rolling", self.rolling_cage_speed(speed)
 
-    def centre(self, y: Float[Array, " dim"]) -> tuple[Scalar, Scalar]:
+    def centre(self, y: Any) -> tuple[Scalar, Scalar]:
         cage = Bodies(*y[-OF_BODIES:])
         land_x, land_y = (cage.ring_x, cage.ring_y) if self.guidance == "inner" else (0.0, 0.0)
         return (cage.x - land_x) / self.clearance, (cage.y - land_y) / self.clearance
@@ -242,7 +250,7 @@ class BearingModel(AbstractForcedSystem):
     def starts(self, speed: Scalar) -> tuple[Float[Array, " dim"], ...]:
         return tuple(_starts(self, jnp.asarray(speed)))
 
-    def excursion(self, y: Float[Array, " dim"]) -> Scalar:
+    def excursion(self, y: Any) -> Scalar:
         """Eccentricity ratio of the cage in its land."""
         return jnp.hypot(*self.centre(y))
 

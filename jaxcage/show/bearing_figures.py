@@ -10,8 +10,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Annulus, Circle, Polygon
 
-from ..analysis import OrderSpectrum
-from ..analysis.rollers import Around, RollerHistory
+from ..analysis import Around, OrderSpectrum, RollerHistory
 from ..bearing import LoadDistribution
 from ..forces import ImpactHistory
 from ..models import BearingModel

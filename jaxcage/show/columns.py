@@ -14,7 +14,7 @@ from ..solve import Trajectory
 
 
 if TYPE_CHECKING:
-    from ..analysis.rollers import RollerHistory
+    from ..analysis import RollerHistory
     from ..orbits import Branch, Curve
     from .parameter_axes import Axis
 

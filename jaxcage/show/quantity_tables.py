@@ -9,8 +9,7 @@ import xarray as xr
 from jaxtyping import Float
 
 from .._parameters import walk
-from ..analysis import Measures, OrderSpectrum, failed, scatter
-from ..analysis.rollers import Around, named_lines
+from ..analysis import Around, Measures, OrderSpectrum, failed, named_lines, scatter
 from ..bearing import Guidance, LoadDistribution, raceway_surface_speed, static_cage_displacement
 from ..files import configuration
 from ..forces import ImpactHistory
