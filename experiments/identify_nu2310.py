@@ -30,7 +30,7 @@ from scipy.stats import qmc
 import jaxcage as jc
 from jaxcage.analysis import CHAOS_THRESHOLD
 from jaxcage.bearing import PUBLISHED_CASES, PublishedCase
-from jaxcage.show import LASTING, compare_edges, wide_zones
+from jaxcage.show.reproduction import LASTING, compare_edges, wide_zones
 
 
 jc.enable_x64()
