@@ -33,7 +33,10 @@ unwrap = inspect.unwrap
         (lambda: jc.sweep(DUFFING, ["a", "b"]), "`speeds` must be a number or an array of numbers"),
         (lambda: jc.sweep(DUFFING, np.array(["2020"], dtype="datetime64[Y]")), "of real numbers"),
         (lambda: jc.sweep(DUFFING, SPEEDS, starts=[(1.0,)]), "states of 2 numbers"),
-        (lambda: jc.sweep("1a", SPEEDS), "`model` must be of kind AbstractForcedSystem or a row of things, but '1a' was given"),
+        (
+            lambda: jc.sweep("1a", SPEEDS),
+            "`model` must be of kind AbstractForcedSystem or a row of things, but '1a'",
+        ),
         (lambda: jc.simulate(DUFFING, 1e300, revolutions=2), "`speed` must be positive and finite, at most"),
         (lambda: jc.simulate(DUFFING, 1.0, revolutions=1, start=(np.nan, 0.0)), r"finite numbers, but \(nan, 0.0\)"),
         (lambda: jc.periodic_orbit(DUFFING, 1.0, method="rk4"), "`method` must be of kind AbstractMethod, but 'rk4'"),
