@@ -12,7 +12,7 @@ from . import (
     show as show,
     solve as solve,
 )
-from ._checks import enable_x64 as enable_x64
+from ._arguments import enable_x64 as enable_x64
 from ._parameters import parameter_info as parameter_info, parameters as parameters, replace as replace
 from .analysis import (
     equilibrium as equilibrium,

@@ -8,7 +8,6 @@ import pytest
 from helpers import document, is_png
 
 import jaxcage as jc
-from jaxcage._sobol import sobol
 from jaxcage.design import Band, Ensemble, binomial_interval, misses, narrow, verdict_of
 from jaxcage.files import (
     ConfigError,
@@ -22,6 +21,7 @@ from jaxcage.files import (
     with_ranges,
     write_template,
 )
+from jaxcage.lanes import sobol
 from jaxcage.show import chances_answer
 
 

@@ -22,7 +22,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Complex, Float
 
-from .._checks import require_x64
+from .._arguments import require_x64
 from .._errors import ArgumentError
 from .._parameters import replace
 from .._types import Scalar

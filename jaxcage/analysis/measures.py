@@ -6,7 +6,7 @@ import jax
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._checks import require_x64
+from .._arguments import require_x64
 from .._errors import ArgumentError
 from .._form import compiled
 from .._notebook import notebook_html

@@ -8,8 +8,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
-from .._arguments import is_concrete, require_above_zero, require_at_least
-from .._checks import require_x64
+from .._arguments import is_concrete, require_above_zero, require_at_least, require_x64
 from .._errors import ArgumentError
 from .._types import Scalar
 from .geometry import Bearing

@@ -15,10 +15,9 @@ from jaxtyping import Bool, Float
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
-from .._sobol import sobol
 from ..analysis import chaotic_share, failed, restless, zones
 from ..files import Unknown, check_together
-from ..lanes import Progress, sweep
+from ..lanes import Progress, sobol, sweep
 from ..models import CageModel
 from ..solve import AbstractMethod, native
 

@@ -17,10 +17,9 @@ from jaxtyping import Bool, Float
 
 from .._arguments import require_at_least
 from .._errors import ArgumentError
-from .._sobol import sobol
 from ..analysis import failed, restless
 from ..files import Measurement, Range, Unknown
-from ..lanes import Progress
+from ..lanes import Progress, sobol
 from ..models import CageModel
 from ..solve import AbstractMethod, native
 from .chances import ERROR, draw, run_draws

@@ -17,8 +17,8 @@ from jaxtyping import Array, Float
 from .._errors import ArgumentError, InputError
 from .._form import compiled
 from .._parameters import parameter_paths, parameters, replace
-from .._sobol import sobol
 from .._types import Scalar
+from ..lanes import sobol
 from ..models import AbstractForcedSystem
 
 

@@ -23,10 +23,9 @@ import numpy as np
 import optax
 from jaxtyping import Float
 
-from .._arguments import require_at_least
-from .._checks import require_x64
+from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError, InputError
-from .._sobol import sobol
+from ..lanes import sobol
 from .checkpoint import Checkpoint
 from .objective import AbstractObjective, Design, DesignSpace, Measured
 

@@ -24,7 +24,7 @@ from typing import Any, Generic, TypeVar, get_args
 
 import equinox as eqx
 
-from .._checks import require_x64
+from .._arguments import require_x64
 from .._parameters import fields_from, must_be_given, parameter_paths
 from ..bearing import BEARINGS, PUBLISHED_CASES, vg
 from ..forces import PocketImpact

@@ -26,7 +26,7 @@ from .dataset import (
     stored_configuration as stored_configuration,
     versions as versions,
 )
-from .grid import OIL as OIL, Grid as Grid, with_values as with_values
+from .grid import OIL as OIL, Grid as Grid, sobol as sobol, with_values as with_values
 from .observe import Progress as Progress, start_tangents as start_tangents
 from .plan import Plan as Plan, Speeds as Speeds, States as States, initial_states as initial_states, rpm as rpm
 from .ramps import (

@@ -20,7 +20,6 @@ from jaxtyping import Float, Int
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._parameters import pick
-from .._sobol import sobol
 from ..bearing import vg
 from ..models import AbstractForcedSystem
 from ..solve import Lanes
@@ -37,6 +36,13 @@ LANES = 2048
 
 Values = dict[str, Float[np.ndarray, " lanes"]]
 """Parameter by name -> its value in each lane [SI]."""
+
+
+def sobol(unknowns: int, draws: int, seed: int | np.random.Generator) -> Float[np.ndarray, "draws unknowns"]:
+    """Scrambled Sobol points between 0 and 1."""
+    from scipy.stats import qmc  # takes half a second to load
+
+    return qmc.Sobol(unknowns, rng=seed).random_base2(math.ceil(math.log2(draws)))[:draws]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

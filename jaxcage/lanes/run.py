@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Float
 
-from .._checks import require_x64
+from .._arguments import require_x64
 from .._types import State
 from ..analysis import label_lanes, motion_label
 from ..models import INSTEAD, AbstractForcedSystem, require_known

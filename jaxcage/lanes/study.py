@@ -14,8 +14,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Array, Float, Int
 
-from .._arguments import require_at_least
-from .._checks import require_x64
+from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
 from ..analysis import scatter
 from ..models import AbstractForcedSystem, require_speeds

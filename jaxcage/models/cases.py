@@ -9,7 +9,7 @@ rigid rib and circulatory cross-coupling.
 
 import dataclasses
 
-from .._checks import require_x64
+from .._arguments import require_x64
 from .._errors import ArgumentError
 from ..bearing import nu2310, published_case, vg
 from ..forces import LandContact, RibFilm, Support, SynchronousImpact, UnbalanceReading

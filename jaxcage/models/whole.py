@@ -11,8 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._arguments import is_concrete
-from .._checks import require_x64
+from .._arguments import is_concrete, require_x64
 from .._errors import ArgumentError
 from .._form import compiled
 from .._parameters import choice, parameter

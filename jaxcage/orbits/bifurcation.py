@@ -8,8 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from .._arguments import require_at_least, shown, wrong
-from .._checks import require_x64
+from .._arguments import require_at_least, require_x64, shown, wrong
 from .._errors import ArgumentError
 from .._form import compiled
 from .._types import Scalar

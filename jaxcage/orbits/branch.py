@@ -9,8 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
-from .._arguments import require_at_least
-from .._checks import require_x64
+from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
-from .._checks import require_x64
+from .._arguments import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..models import AbstractForcedSystem

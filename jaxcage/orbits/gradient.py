@@ -20,8 +20,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._arguments import require_at_least
-from .._checks import require_x64
+from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
 from .._form import compiled
 from .._notebook import notebook_html

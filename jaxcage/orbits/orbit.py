@@ -10,8 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
 
-from .._arguments import require_at_least, shown
-from .._checks import require_x64
+from .._arguments import require_at_least, require_x64, shown
 from .._errors import ArgumentError
 from .._form import compiled
 from .._notebook import notebook_html

@@ -16,8 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from .._arguments import require_at_least
-from .._checks import require_x64
+from .._arguments import require_at_least, require_x64
 from .._form import compiled
 from .._notebook import notebook_html
 from .._types import Scalar

@@ -10,7 +10,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Int
 
-from .._checks import require_x64
+from .._arguments import require_x64
 from .._form import split
 from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, require_speeds

@@ -8,8 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._arguments import require_at_least, shown
-from .._checks import require_x64
+from .._arguments import require_at_least, require_x64, shown
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar, State
