@@ -12,7 +12,7 @@ from .._parameters import parameter_info, parameters, readings_of
 from ..analysis import Zones, failed, resolution_rpm, restless
 from ..bearing import design_rule_violations
 from .bearing_figures import load_bars
-from .chance_tables import chances_notes, chances_tables, operating_chances
+from .chance_tables import chances_answer, chances_notes, chances_tables, operating_chances
 from .checks import checks_table, provenance_table
 from .design_figures import chance_of_chaos, elasticity_bars
 from .diagrams import SWEPT, reported, sweep_figure
@@ -181,7 +181,7 @@ def _result(findings: Findings, chances: "Ensemble | None", left: Sequence[str])
     if chances is not None:
         said.append(
             f"All zones of this page are those of the best guesses: {len(chances.unknowns)} values are known within "
-            f"ranges only. {chances_notes(chances)[0]}"
+            f"ranges only. {chances_answer(chances)}"
         )
     if left:
         said.append(f"Values that are still the template's, another bearing's: {', '.join(left)}.")
