@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
-from jaxcage.solve import FINISHED, OUTCOMES, Engine, Lanes, engine_of, histories, say_once
+from jaxcage.solve import FINISHED, Engine, Lanes, engine_of, histories, say_once
 from jaxcage.solve.object_code import object_code
 
 
@@ -100,9 +100,9 @@ def test_a_lane_that_fails_leaves_its_neighbours_alone():
     system = jc.ForcedOscillator(law, coordinates=1)
     starts = np.array([[[0.1, 0.0]], [[np.nan, 0.0]], [[3.0, 1.0]], [[-0.1, 0.0]]])
     found = jc.sweep(system, np.array([1.0, 1.1, 1.2, 1.3]), starts=starts, discard=0, revolutions=1, blocks=1)
-    names = [OUTCOMES[code] for code in found.outcome[:, 0]]
+    names = found.outcome.values[:, 0]
     assert names[0] == names[3] == "successful" and names[1] == "not_finite" and names[2] != "successful"
-    assert np.all(np.isfinite(found.last[[0, 3]])) and np.all(np.isnan(found.last[[1, 2]]))
+    assert np.all(np.isfinite(found.last.values[[0, 3]])) and np.all(np.isnan(found.last.values[[1, 2]]))
 
 
 class Polynomial(eqx.Module):
@@ -126,7 +126,7 @@ def test_a_law_that_has_no_machine_code_is_run_by_jax_and_says_so(name: str):
     say_once.cache_clear()
     with pytest.warns(UserWarning, match=f"operation `{name}`, which has no machine code"):
         found = jc.sweep(system, 1.5, discard=20, revolutions=20, confirm=False, horizon=0)
-    assert set(found.label.ravel()) == {"periodic-1"}
+    assert set(found.label.values.ravel()) == {"periodic-1"}
 
 
 def test_histories_are_run_again_until_their_error_is_allowed():

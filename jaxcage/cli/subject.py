@@ -157,9 +157,9 @@ class Subject:
     @property
     def notes(self) -> list[str]:
         """The same in sentences."""
-        said, readings = self.document, jc._parameters.readings_of(self.model).items()
+        said, readings = self.document, jc.show.readings_words(self.model)
         each = {
-            "Readings": [f'{name.replace("_", " ")} {words} ("{chosen}")' for name, (chosen, words) in readings],
+            "Readings": [readings] if readings else [],
             "As the template has them, of another bearing": said.get("left_as_in_template"),
             "Best guesses of values known within ranges only": said.get("best_guesses"),
         }

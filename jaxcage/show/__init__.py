@@ -144,7 +144,7 @@ from .quantity_tables import (
     unit_of as unit_of,
 )
 from .sections import Section as Section, assess as assess, verdict_table as verdict_table
-from .sources import sources_table as sources_table
+from .sources import readings_words as readings_words, sources_table as sources_table
 from .speed_axes import (
     add_shaft_axes as add_shaft_axes,
     mark_operating as mark_operating,
