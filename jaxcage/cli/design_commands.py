@@ -86,7 +86,7 @@ def design(
         raise InputError("Option --worst goes with --scatter.")
     given = {"wear": wear, "force": force, "impulse": impulse, "power": power, "slip": slip, "balance": balance}
     usual = subject.usual({"wear": 1e3, "force": 1e3, "power": 0.0}, dict.fromkeys(given, 1.0))
-    prices = {name: price if given[name] is None else given[name] for name, price in usual.items()}
+    prices: dict[str, Any] = {name: price if given[name] is None else given[name] for name, price in usual.items()}
     if subject.with_rollers and not sum(prices.values()):
         raise InputError(f"Options {', '.join(f'--{name}' for name in prices)} must not all be 0.")
     runs, chaos, finer = _runs(subject, over, means, seed)

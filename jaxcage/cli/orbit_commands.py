@@ -61,7 +61,7 @@ def _searched(
     **Raises:** `NoResult` if there are none, and for a `purpose` of edges if there are no edges.
     """
     low, *_, high = subject.range(o.Range(over.first, over.last), 2)
-    length = {name: x for name, x in (("count", over.count), ("discard", discard)) if x is not None}
+    length: dict[str, Any] = {name: x for name, x in (("count", over.count), ("discard", discard)) if x is not None}
     with show.computing(f"synchronous orbits of {subject.name}") as say:
         found = jc.orbits.synchronous_orbits(subject.model, low, high, **length, method=method, progress=say)
     between, loss = f"between {found.lower_rpm:g} and {found.upper_rpm:g} rpm", jc.loss_zones(found)
@@ -160,8 +160,8 @@ def gradient(
     if not trusted:
         reasons = ", ".join(f"{edge}: {slope.status}" for edge, slope in edges.items())
         raise NoResult(f"No edge is a function of the design here ({reasons}): try more --steps.")
-    ends = [trusted.get(f"zone 1 {end}") for end in ("onset", "exit")]
-    each = [*([jc.orbits.width(*ends, "zone 1 width")] if all(ends) else []), *trusted.values()]
+    ends: list[Any] = [trusted.get(f"zone 1 {end}") for end in ("onset", "exit")]
+    each = [*([jc.orbits.width(ends[0], ends[1], "zone 1 width")] if all(ends) else []), *trusted.values()]
     bars = lambda ax: jc.show.elasticity_bars(jc.show.to_be_turned(model, each), ax)
     files = {"figure": (".png", drawn(f"{name}: elasticities of the edges", bars, 9.0, 2.2 + 1.2 * len(each)))}
     tables = [
@@ -278,7 +278,8 @@ def map_(
     at = None if x == "speed" or no_points else subject.speed(speed)
     low, *_, high = subject.range(o.Range(over.first, over.last), 2)
     across = jc.show.Axis(x, low, high, "rad/s") if x == "speed" else jc.show.parameter_axis(model, x)
-    up, found, curves, refused = jc.show.parameter_axis(model, y, **ends), None, [], {}
+    up, curves, refused = jc.show.parameter_axis(model, y, **ends), [], {}
+    found: Any = None
     document, title = {"x": x, "y": y, "x_range": across.range, "y_range": up.range}, f"{name} over {x} and {y}"
     files, tables, stem = {}, [], f"_{x}_{y}"
     if not no_points:

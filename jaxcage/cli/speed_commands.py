@@ -52,7 +52,7 @@ def simulate(
     model, at, method = subject.model, subject.speed(speed), run.method
     where, stem = subject.at(at), f"_{speed:g}rpm"
     steps = getattr(method, "steps", 128)  # of equal steps the samples must divide the number
-    length = {"revolutions": run.revolutions or 20, "discard": run.discard or 0}
+    length: dict[str, Any] = {"revolutions": run.revolutions or 20, "discard": run.discard or 0}
     samples = max(n for n in range(1, min(128, steps) + 1) if steps % n == 0)
     with show.computing(f"simulate {subject.name}"):
         found = jc.simulate(model, at, **length, samples=samples, method=method)
@@ -176,7 +176,7 @@ def chances(subject: Subject, over: o.Range, draws: int, seed: int, run: o.RunOp
 def draw(subject: Subject, speeds: Any, draws: int, seed: int, run: o.RunOptions, progress: Any) -> Any:
     """The motions of draws from the ranges of a file over speed, of at most 100 revolutions after 100."""
     most = jc.design.REVOLUTIONS
-    length = {name: min(getattr(run, name) or most, most) for name in ("discard", "revolutions")}
+    length: dict[str, Any] = {name: min(getattr(run, name) or most, most) for name in ("discard", "revolutions")}
     length |= {"blocks": o.blocks_of(length["revolutions"]), "draws": draws, "seed": seed, "method": run.method}
     given = subject.model, subject.unknowns, speeds
     return jc.design.ensemble(*given, **length, progress=partial(progress, "draws"))
@@ -192,7 +192,8 @@ def poincare(
     """Strobe section at one speed, from all initial states."""
     subject = read_case(case)
     subject.require_orbits("poincare")
-    at, stem, settings = subject.speed(speed), f"_{speed:g}rpm", run.settings | {"keep": run.revolutions}
+    settings: dict[str, Any] = run.settings | {"keep": run.revolutions}
+    at, stem = subject.speed(speed), f"_{speed:g}rpm"
     where = f"{subject.name}, {subject.at(at)}"
     with show.computing(f"poincare {subject.name}") as progress:
         found = jc.sweep(subject.model, np.array([at]), **settings, progress=partial(progress, ""))
@@ -327,7 +328,7 @@ def runup(
     title = f"Run-up and run-down of {subject.name}, {rate:g} rpm/s, {found.attrs['revolutions']} revolutions each"
     document = {"rate_rpm_per_s": rate, "hysteresis_rpm": spans, "ramp_seconds": found.attrs["seconds"]}
     document |= {way: {n: x[n].values for n in ("rpm", *x.data_vars)} for way, x in ways.items()}
-    figure = jc.show.ramp_figure(*ways.values(), names, spans, title)
+    figure = jc.show.ramp_figure(ways["up"], ways["down"], names, spans, title)
     files = {"figure": (".png", figure), "data": (".csv", data | {"differs": differs})}
     return Answer(said, [jc.show.Table(title, columns)], [], document, subject, files)
 
@@ -381,7 +382,11 @@ def study(
     settings |= {"shard": shard, "executor": executor, "scheduler": scheduler, "workers": workers, **run.settings}
     settings |= {} if exponents is None else {"exponents": exponents}
     with show.computing(f"study {subject.name}", ADVICE) as bar:
-        report = lambda so_far, total: (done.append(so_far), bar("lanes", so_far, total))
+
+        def report(so_far: int, total: int) -> None:
+            done.append(so_far)
+            bar("lanes", so_far, total)
+
         try:
             with jc.study(subject.model, given, store=path, progress=report, **settings) as stored:
                 names = [str(name) for name, x in stored.data_vars.items() if x.dims == stored["label"].dims]

@@ -134,7 +134,10 @@ def _read(name: str, text: str, subject: Subject) -> Any:
     if len(parts) > 3:
         raise ValueError(f"must have {FORMS}, but '{text}' was given.")
     given = text.split(",")
-    found = np.linspace(*map(number, parts[:2]), int(parts[2])) if len(parts) == 3 else np.array([*map(number, given)])
+    spaced = len(parts) == 3
+    found = (
+        np.linspace(number(parts[0]), number(parts[1]), int(parts[2])) if spaced else np.array([*map(number, given)])
+    )
     if np.unique(found).size < found.size or not np.all(np.isfinite(found)):
         raise ValueError(f"must have distinct values, but '{text}' was given.")
     return found

@@ -10,6 +10,7 @@ held the truth.
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -169,6 +170,7 @@ def misses(
     rpm = np.unique([m.cage_rpm for m in measured])
     found = run_draws(models, rpm * np.pi / 30, method, progress)
     lost, rattles = (np.array([of(each) for each in found]) for of in (lambda each: failed(each)[:, 0], restless))
+    moved: Any = None
     if any(m.quantity in ("orbit size", "whirl frequency") for m in measured):
         moved = motions(models, xr.concat(found, "design"), method=native(error=ERROR))
     columns = []

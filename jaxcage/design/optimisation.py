@@ -217,7 +217,8 @@ def optimise(
 
 
 def _read(row: dict[str, Any]) -> Step:
-    return Step(**{k: tuple(v) if isinstance(v, list) else v for k, v in row.items()})
+    read: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in row.items()}
+    return Step(**read)
 
 
 def _settled(history: Sequence[Step], tolerance: float) -> bool:

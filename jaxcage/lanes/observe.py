@@ -56,7 +56,7 @@ class Observation:
     """State at the end of the run [SI]."""
     strobe: Float[np.ndarray, "lanes keep dim"]
     """The last strobe states [SI]."""
-    growth: Float[np.ndarray, "lanes blocks exponents"]
+    growth: Float[np.ndarray, "lanes followed exponents"]
     """Mean logarithmic growth of tangent vectors per revolution in each block."""
     peak: Float[np.ndarray, " lanes"]
     """Largest excursion while observed; for a cage the eccentricity ratio."""

@@ -298,11 +298,10 @@ def periodic_orbit(
 
 def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Guess | None) -> Float[Array, " dim"]:
     """Return a guess as an array, without derivative."""
-    if guess is None:
-        guess = system.starts(speed)[0]
+    given: Any = system.starts(speed)[0] if guess is None else guess
     wanted = f"must be a state of {system.dimension} numbers"
     try:
-        state = guess.state if isinstance(guess, Orbit) else jnp.stack([jnp.asarray(c, dtype=float) for c in guess])
+        state = given.state if isinstance(given, Orbit) else jnp.stack([jnp.asarray(c, dtype=float) for c in given])
     except (TypeError, ValueError) as error:  # of another kind, or ragged
         raise ArgumentError("guess", said=f"{wanted}, but {shown(guess)} was given.") from error
     if state.shape != (system.dimension,):

@@ -167,7 +167,7 @@ def mean_gradient_tables(title: str, found: MeanGradient) -> list[Table]:
     """Elasticities of means with their errors, the largest first, and the means."""
     rows, moved = [], []
     for name, each in found.statistics.items():
-        by = {
+        by: dict[str, dict[str, Any]] = {
             direction: dict(zip(("elasticity", "error"), pair, strict=True))
             for direction, *pair in zip(each.directions, each.elasticity, each.elasticity_error, strict=True)
         }

@@ -46,7 +46,9 @@ def force_history(trajectory: Trajectory, forces: Forces, axis: int = 1, ax: Axe
     """Each force on the cage over time, its horizontal (`axis` 0) or vertical (1) component."""
     own = cycle(OWN_COLOURS)
     looks = lambda name: (FORCE_COLOURS[name], "-") if name in FORCE_COLOURS else (next(own), "--")
-    lines = {name: (force[:, axis], *looks(name)) for name, force in forces.items()}
+    lines: dict[str, tuple[np.ndarray, str, str]] = {
+        name: (force[:, axis], *looks(name)) for name, force in forces.items()
+    }
     return _over_time(trajectory, lines, f"{('Horizontal', 'Vertical')[axis]} force [N]", ax)
 
 

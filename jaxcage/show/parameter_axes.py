@@ -75,7 +75,7 @@ def follow_edges(
 ) -> tuple[list[Curve], dict[str, str]]:
     """A curve through each named edge, and the reason where there is none."""
     curves, refused = [], {}
-    limits = {"lower": y.lower, "upper": y.upper, "x_lower": x.lower, "x_upper": x.upper}
+    limits: dict[str, Any] = {"lower": y.lower, "upper": y.upper, "x_lower": x.lower, "x_upper": x.upper}
     for done, (name, point) in enumerate(edges.items()):
         say("curves", done, len(edges))
         kind: Any = point.kind

@@ -140,7 +140,7 @@ def run_all(
     first = SECTION_REVOLUTIONS[0]
     observed = section_revolutions - first
     blocks = max(n for n in range(1, 21) if observed % n == 0)
-    length = {"discard": first, "revolutions": observed, "blocks": blocks, "keep": observed}
+    length: dict[str, Any] = {"discard": first, "revolutions": observed, "blocks": blocks, "keep": observed}
     sections = sweep(cases, np.array([rpm(SECTION_RPM)]), starts=1, **length)
     return Runs(models, swept, {name: zones(s) for name, s in swept.items()}, loss, by_name(sections))
 

@@ -43,7 +43,7 @@ def _strobe(
             field, scale = BesideField(field), (scale, jnp.ones(len(system.beside)))
         strobe = StrobeMap(field, system, scale, method)
         state = lambda row: multiply((row[:dim], row[dim:]) if system.beside else tuple(row), scale)
-        moved = moved_by(lambda z: strobe.part(z, i, parts), state(y), [state(t) for t in tangents])
+        moved: Any = moved_by(lambda z: strobe.part(z, i, parts), state(y), [state(t) for t in tangents])
         joined = jnp.concatenate if system.beside else jnp.stack
         row = lambda z: joined(divide(z, scale))
         after = jnp.stack([row(t) for t in moved.tangents]) if moved.tangents else tangents

@@ -247,7 +247,8 @@ class AdaptiveSteps(AbstractMethod):
         return AdaptiveSteps(self.solver, factor * self.rtol, factor * self.atol, self.max_steps)
 
     def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
-        field, system, scale = pieces
+        field: Any = pieces.field
+        system, scale = pieces.system, pieces.scale
         length = REVOLUTION / jnp.asarray(parts, dtype=float)
         watches = isinstance(field, BesideField)
         saved, norm, most = dfx.SubSaveAt(t1=True), optx.rms_norm, self.max_steps
