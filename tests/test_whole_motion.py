@@ -338,8 +338,8 @@ def test_simulate_prints_slips_forces_and_losses(capsys: pytest.CaptureFixture[s
     assert len(found["around"]["roller_slip"]) == 36
     with Image.open(found["figure"]) as picture:
         assert picture.size == (2400, 1600)
-    assert len(read_columns(found["data"])["pocket_force_13 [N]"]) == 65
-    run = jc.simulate(jc.whole_bearing("nu2310"), jc.rpm(10000), revolutions=1)
+    assert len(read_columns(found["data"])["pocket_force_13 [N]"]) == 129
+    run = jc.simulate(jc.whole_bearing("nu2310"), jc.rpm(10000), revolutions=1, samples=128)
     expected = jc.measures(jc.whole_bearing("nu2310"), run)
     assert found["measures"] == pytest.approx({name: each.value for name, each in expected.items()}, rel=1e-12)
 
@@ -353,7 +353,7 @@ def test_speed_of_the_cage(capsys: pytest.CaptureFixture[str], tmp_path: pathlib
 
 def test_what_a_whole_bearing_does_not_take(capsys: pytest.CaptureFixture[str]):
     assert main(["bifurcations", "nu2310"]) == 2
-    assert "but `jaxcage bifurcations` takes a cage" in capsys.readouterr().err
+    assert "Command bifurcations takes a cage, but nu2310" in capsys.readouterr().err
     assert main(["simulate", "nu2310", "--speed", "10000", "--solver", "rk4"]) == 2
     assert "--solver" in capsys.readouterr().err
     assert main(["simulate", "nu2310", "--speed", "200000"]) == 2

@@ -45,10 +45,10 @@ def time_history(trajectory: Trajectory, ax: Axes | None = None) -> Axes:
 def force_history(trajectory: Trajectory, forces: Forces, axis: int = 1, ax: Axes | None = None) -> Axes:
     """Each force on the cage over time, its horizontal (`axis` 0) or vertical (1) component."""
     own = cycle(OWN_COLOURS)
-    looks = lambda name: (FORCE_COLOURS[name], "-") if name in FORCE_COLOURS else (next(own), "--")
-    lines: dict[str, tuple[np.ndarray, str, str]] = {
-        name: (force[:, axis], *looks(name)) for name, force in forces.items()
-    }
+    lines: dict[str, tuple[np.ndarray, str, str]] = {}
+    for name, force in forces.items():
+        colour, dash = (FORCE_COLOURS[name], "-") if name in FORCE_COLOURS else (next(own), "--")
+        lines[name] = force[:, axis], colour, dash
     return _over_time(trajectory, lines, f"{('Horizontal', 'Vertical')[axis]} force [N]", ax)
 
 
