@@ -357,6 +357,6 @@ def test_what_a_whole_bearing_does_not_take(capsys: pytest.CaptureFixture[str]):
     assert main(["simulate", "nu2310", "--speed", "10000", "--solver", "rk4"]) == 2
     assert "--solver" in capsys.readouterr().err
     assert main(["simulate", "nu2310", "--speed", "200000"]) == 2
-    assert "at most 300 m/s at its land" in capsys.readouterr().err
+    assert "is 300 m/s at its land" in capsys.readouterr().err
     assert main(["simulate", "1a", "--speed", "8500", "--load", "300 N"]) == 2
-    assert "Option --load goes with a whole bearing" in capsys.readouterr().err
+    assert "Option --load goes with a bearing with its rollers" in capsys.readouterr().err
