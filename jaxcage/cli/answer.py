@@ -115,7 +115,8 @@ def plain(value: Any) -> Any:
         return [plain(v) for v in value]
     if value is None or isinstance(value, str | bool | int):
         return value
-    if hasattr(value, "tolist") and not isinstance(value, float):  # an array of NumPy or JAX
-        return plain(value.tolist())
-    number = float(value)
+    listed = None if isinstance(value, float) else getattr(value, "tolist", None)
+    if listed is not None:  # an array of NumPy or JAX
+        return plain(listed())
+    number: Any = float(value)  # pyright: ignore[reportArgumentType]
     return number if math.isfinite(number) else None

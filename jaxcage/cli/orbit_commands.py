@@ -272,13 +272,13 @@ def map_(
         raise InputError("Option --speed goes with an --x that is not the speed.")
     for end, text in (("lower", lower), ("upper", upper)):
         try:
-            ends |= {} if text is None else {end: jc.files.to_si(text, jc.parameter_info(model)[y].unit)}
+            ends |= {} if text is None else {end: jc.files.to_si(text, jc.parameter_info(model)[str(y)].unit)}
         except ValueError as error:
             raise ArgumentError(end, said=f"{error}.") from error
     at = None if x == "speed" or no_points else subject.speed(speed)
     low, *_, high = subject.range(o.Range(over.first, over.last), 2)
     across = jc.show.Axis(x, low, high, "rad/s") if x == "speed" else jc.show.parameter_axis(model, x)
-    up, curves, refused = jc.show.parameter_axis(model, y, **ends), [], {}
+    up, curves, refused = jc.show.parameter_axis(model, str(y), **ends), [], {}
     found: Any = None
     document, title = {"x": x, "y": y, "x_range": across.range, "y_range": up.range}, f"{name} over {x} and {y}"
     files, tables, stem = {}, [], f"_{x}_{y}"

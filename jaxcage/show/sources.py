@@ -40,10 +40,11 @@ def sources_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, 
         if info is not None:
             unit, number = shown(float(value), info.unit)
             text, value = info.text, f"{number:.6g}"
-        name, part = ".".join(path), path[0].replace("_", " ") if len(path) > 1 else "model"
+        name, first = ".".join(path), path[0]
+        part = "model" if name == first else first.replace("_", " ")
         if {name, name.removesuffix("_x").removesuffix("_y")} & set(left):
             source = "the template's, not yours"
-        elif path[0] == EXTRA:
+        elif first == EXTRA:
             source = "a force of your own"
         else:
             source = _published(model, path, field) if table is None else _in_file(path, table)

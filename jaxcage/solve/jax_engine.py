@@ -50,7 +50,7 @@ def _strobe(
         return row(moved.y), after, jnp.atleast_1d(moved.peak), moved.outcome
 
     if isinstance(parts, int):
-        return jax.vmap(lambda *x: lane(*x, parts))(list(own), y, tangents, i)
+        return jax.vmap(lambda own, y, tangents, i: lane(own, y, tangents, i, parts))(list(own), y, tangents, i)
     return jax.vmap(lane)(list(own), y, tangents, i, parts)
 
 
