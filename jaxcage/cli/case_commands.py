@@ -34,7 +34,8 @@ def init(
         json: Print one JSON document on standard output.
     """
     written = jc.files.write_template(path, model)
-    said = f"Written: {written}. It describes the NU2310 of case 1a: change the values and go on, e.g. with"
+    what = "an NU2310 with its rollers" if model == "bearing" else "the NU2310 of case 1a"
+    said = f"Written: {written}. It describes {what}: change the values and go on, e.g. with"
     commands = [f"  jaxcage {command} {path}" for command in ("statics", "sweep", "zones", "report")]
     return Answer(said, notes=commands, document={"file": str(written)})
 

@@ -154,7 +154,8 @@ def rows_table(
 
     def filled(column: Column) -> Column:
         errors = pick(column.errors) if isinstance(column.errors, str) else column.errors
-        return dataclasses.replace(column, values=pick(column.key or column.head), errors=errors)
+        nothing = column.nothing if found else ""
+        return dataclasses.replace(column, values=pick(column.key or column.head), errors=errors, nothing=nothing)
 
     return Table(title, [filled(column) for column in columns], key, found)
 
