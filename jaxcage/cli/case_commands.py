@@ -34,9 +34,11 @@ def init(
         json: Print one JSON document on standard output.
     """
     written = jc.files.write_template(path, model)
-    what = "an NU2310 with its rollers" if model == "bearing" else "the NU2310 of case 1a"
+    what, first = (
+        ("an NU2310 with its rollers", "zones") if model == "bearing" else ("the NU2310 of case 1a", "statics")
+    )
     said = f"Written: {written}. It describes {what}: change the values and go on, e.g. with"
-    commands = [f"  jaxcage {command} {path}" for command in ("statics", "sweep", "zones", "report")]
+    commands = [f"  jaxcage {command} {path}" for command in dict.fromkeys((first, "sweep", "zones", "report"))]
     return Answer(said, notes=commands, document={"file": str(written)})
 
 
