@@ -83,7 +83,7 @@ def test_the_synchronous_force_of_a_known_one(run):
     theta = ran.angle - ran.angle[0]
     time = theta / 400.0
     fx, fy = 7 * np.cos(theta - 0.3) + 2, 3 * np.sin(2 * theta)
-    integrals = np.zeros_like(ran.integrals)
+    integrals = ran.integrals.copy()
     integrals[:, :2] = np.column_stack([ran.angle, time])
     running = lambda f: np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) / 2 * np.diff(time))])
     for name, f in (("x", fx), ("y", fy)):

@@ -116,7 +116,7 @@ def scatter(blocks: Float[np.ndarray, "..."], axis: int = -1) -> Float[np.ndarra
     count = blocks.shape[axis]
     if count < 2:
         return np.full(np.delete(blocks.shape, axis), np.inf)
-    return np.std(blocks, axis=axis, ddof=1) / np.sqrt(count)
+    return np.asarray(np.std(blocks, axis=axis, ddof=1) / np.sqrt(count))
 
 
 def label_lanes(

@@ -297,9 +297,9 @@ class LandLoad(AbstractStatistic):
         return LAND_LOADS.get(self.name, "m")
 
 
-def _cage_speed(model: Any, speed: np.ndarray) -> np.ndarray:
+def _cage_speed(model: AbstractForcedSystem, speed: np.ndarray) -> np.ndarray:
     """Speeds of the cage [rad/s] at speeds of the model."""
-    return np.asarray(model.rolling_cage_speed(jnp.asarray(speed))) if hasattr(model, "rolling_cage_speed") else speed
+    return np.array([float(model.turning_speed(v)) for v in speed.tolist()])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
