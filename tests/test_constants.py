@@ -40,7 +40,7 @@ def test_an_unknown_set_gets_a_sentence():
 
 
 def chaotic_share(model, grid):
-    return np.mean(raw_sweep(model, grid, discard=150, revolutions=100).chaotic_share > 0)
+    return np.mean(jc.analysis.chaotic_share(raw_sweep(model, grid, discard=150, revolutions=100)) > 0)
 
 
 @pytest.mark.wide

@@ -190,7 +190,7 @@ def test_growth_in_chaos(rpm):
     """Revolution by revolution, from a state of the attractor: nothing depends on how long one looks."""
     model, speed = jc.case("1a"), jc.rpm(rpm)
     settled = jc.sweep(model, speed, discard=150, revolutions=100, horizon=0)
-    at = settled.last[0, list(settled.label[0]).index("chaotic")]
+    at = settled.last.values[0, list(settled.label.values[0]).index("chaotic")]
     brief = dict(discard=0, revolutions=6, blocks=6, confirm=False, horizon=0)
     ours = jc.sweep(model, speed, starts=at[None, None], method=jc.method("rk4", steps=8192), **brief)
     theirs = reference.growth(reference.field(model, speed), at, 6, direction=start_tangents(4, 1)[0])

@@ -151,7 +151,7 @@ def test_a_lane_that_fails_spoils_no_other(swept):
     model, starts, both = swept
     assert list(both.outcome.values[0]) == ["successful", "outside"] and both.label.values[0, 1] == "failed"
     alone = jc.sweep(model, SPEED, starts=starts[:1], **SHORT)
-    for name in ("cage_slip", "pocket_force_max_N", "friction_power_W", "whirl_ratio", "exponents", "error"):
+    for name in ("cage_slip", "pocket_force_max_N", "friction_power_W", "whirl_ratio", "exponents"):
         good, bad = both[name].values[0]
         np.testing.assert_array_equal(good, alone[name].values[0, 0])
         assert np.all(np.isnan(bad)) and np.all(np.isfinite(good))
