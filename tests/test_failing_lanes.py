@@ -92,13 +92,14 @@ def test_a_cage_thrown_at_the_rib_is_never_outside_in_silence(solver: str, steps
 @pytest.mark.wide
 def test_with_fine_steps_the_rib_turns_a_thrown_cage_back():
     """Nothing goes deeper than where the contact has taken all its energy; what has more than that is refused."""
-    speed, found = thrown(MODEL, jc.method("rk4", steps=1024))
+    model = jc.case("1a")
+    speed, found = thrown(model, jc.method("rk4", steps=1024))
     lost, peak, hard = failed(found)[0], found["peak"].values[0], speed < 100
-    energy = 0.5 * float(MODEL.cage_mass) * speed**2
-    depth = (19 / 9 * energy / float(MODEL.contact.stiffness)) ** (9 / 19)
-    limit = float(MODEL.contact.onset) + depth / float(MODEL.clearance)
+    energy = 0.5 * float(model.cage_mass) * speed**2
+    depth = (19 / 9 * energy / float(model.contact.stiffness)) ** (9 / 19)
+    limit = float(model.contact.onset) + depth / float(model.clearance)
     assert np.all(limit[~hard] > 2) and np.array_equal(lost, ~hard) and np.all(peak[hard] < limit[hard])
-    assert np.all(peak[hard] > float(MODEL.contact.onset))  # every one of them met the wall
+    assert np.all(peak[hard] > float(model.contact.onset))  # every one of them met the wall
     fast = speed == 10.0
     assert np.all(peak[fast] > 1 + 0.6 * (limit[fast] - 1))
 

@@ -25,7 +25,7 @@ from jaxcage.cli import main
 from jaxcage.cli.answer import _write
 from jaxcage.cli.options import ShowOptions
 from jaxcage.files import save_model, write_template
-from jaxcage.lanes import Plan, Store, Study, load, open_study, run_study, save
+from jaxcage.lanes import Grid, Run, Store, Study, load, open_study, run_study, save
 from jaxcage.show import new_figure, write_columns
 
 
@@ -92,9 +92,11 @@ def _duffing(tau: Any, q: Any, v: Any, speed: Any) -> tuple[Any]:
 @pytest.mark.wide
 def test_a_study_on_a_full_disk_goes_on(tmp_path: Path):
     """Out of room at once, or after some of its chunks: called again, it ends with the files of an unbroken study."""
-    plan = Plan({"speed": np.linspace(1.1, 1.9, 12)}, {}, 0, 0, 2, 6)
+    grid = Grid({"speed": np.linspace(1.1, 1.9, 12)}, {}, 0, 0, 2, 6)
     system = jc.ForcedOscillator(_duffing, coordinates=1)
-    study = Study(system, plan, jc.method("rk4", steps=32), 10, 10, 5, 1, 0, "duffing", "1")
+    length = dict(discard=10, revolutions=10, blocks=5, exponents=1, confirm=False, horizon=0)
+    run = Run.of(system, method=jc.method("rk4", steps=32), **length)
+    study = Study(system, grid, run, 0, "duffing", "1")
     run_study(study, tmp_path / "whole.zarr")
     store = tmp_path / "study.zarr"
     with full_disk(100), pytest.raises(OSError, match=r"not be written to \(File too large\).* goes on from there"):
@@ -109,10 +111,10 @@ def test_a_study_on_a_full_disk_goes_on(tmp_path: Path):
     with disk, pytest.raises(OSError, match="what is stored stays, and once there is room the same call goes on"):
         run_study(study, store, progress=fills_up)
     stored = open_study(store)["outcome"].values
-    assert np.sum(stored == 0) == plan.size / 2 and np.sum(stored == -1) == plan.size / 2
+    assert np.sum(stored == "successful") == grid.size / 2 and np.sum(stored == "pending") == grid.size / 2
     seen: list[int] = []
     run_study(study, store, progress=lambda done, _: seen.append(done))
-    assert seen[0] == plan.size / 2
+    assert seen[0] == grid.size / 2
     assert contents(store) == contents(tmp_path / "whole.zarr")
     assert Store(store, study).pending() == []
 
