@@ -312,7 +312,7 @@ def liouville_defect(model, speed, start, steps):
     tau, _, _, divergence = first_revolution(model, speed, start, steps)
     method, at = jc.method("rodas4", steps=steps), in_si(model, speed, start)
     strobe = jc.strobe_map(model, speed, method)
-    matrix = np.asarray(jax.jit(jax.jacfwd(lambda y: jnp.stack(strobe(tuple(y)))))(jnp.asarray(at)))
+    matrix = np.asarray(jax.jit(jax.jacfwd(lambda y: jnp.stack(strobe(tuple(y)).y)))(jnp.asarray(at)))
     size = np.array([1.0, 1.0, speed, speed])
     expected = simpson(divergence, x=tau)
     return abs(np.linalg.slogdet(matrix * size / size[:, None])[1] - expected), abs(expected)

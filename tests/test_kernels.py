@@ -222,7 +222,7 @@ def test_several_designs_in_one_batch_give_what_each_gives_alone():
         alone = raw_sweep(model, speeds, **options)
         np.testing.assert_array_equal(got.outcome, alone.outcome)
         np.testing.assert_allclose((got.strobe / got.scale).values, (alone.strobe / alone.scale).values, atol=1e-6)
-    with pytest.raises(ValueError, match="at least one system"):
+    with pytest.raises(ValueError, match="at least one design"):
         raw_sweep([], speeds)
     other = eqx.tree_at(lambda m: m.film, MODEL, dataclasses.replace(MODEL.film, model="full"))
     with pytest.raises(ValueError, match="differ in their numbers only"):

@@ -16,7 +16,7 @@ from jaxtyping import Array, Float, Int
 
 from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
-from ..analysis import scatter
+from ..analysis import LONGEST_PERIOD, scatter
 from ..models import AbstractForcedSystem, require_speeds
 from ..quantities import quantity
 from .dataset import CODES, configuration_of, settings_of
@@ -27,6 +27,10 @@ from .run import run_lanes
 from .settings import Run
 from .spread import Spread
 from .store import Results, Store, Variable, open_study
+
+
+CLOSING = 2 * LONGEST_PERIOD
+"""Strobe states over which orbits are seen to close."""
 
 
 Vary = Mapping[str, Float[Array, " values"] | Float[np.ndarray, " values"] | Spread]
@@ -172,7 +176,7 @@ def study(
     axes = {each: np.asarray(x, dtype=float) for each, x in vary.items() if each not in sampled}
     own = len(model.starts(1.0)) if starts is None else starts
     most = lanes or (LANES if model.samples == 1 else LANES // 42)
-    run = Run.of(model, **{"keep": max(16, strobe), **settings, "confirm": False, "horizon": 0})
+    run = Run.of(model, **{"keep": max(CLOSING, strobe), **settings, "confirm": False, "horizon": 0})
     about = Study(model, Grid(axes, sampled, samples, seed, own, most), run, strobe, name, version)
     run_study(about, store, shard, executor, scheduler, workers, progress)
     return open_study(store)
@@ -262,7 +266,7 @@ def label_map(
     fixed = {} if speed is None else {SPEED: np.array([speed])}
     grid = Grid({x_name: x_value, y_name: y_value, **fixed}, {}, 0, 0, starts)
     grid.require_known(model)
-    run = Run.of(model, **{**settings, "confirm": False, "horizon": 0})
+    run = Run.of(model, **{"keep": CLOSING, **settings, "confirm": False, "horizon": 0})
     require_at_least(0, persist=persist)
     if persist and (persist <= run.discard or run.exponents < 1 or run.blocks < 2):
         allowed = f"0 or above the {run.discard} revolutions discarded, with an exponent and 2 blocks"
