@@ -30,4 +30,4 @@ def test_imports_go_down_and_to_public_names_only(path: pathlib.Path):
 
 
 def test_every_layer_is_on_the_list():
-    assert {p.name for p in ROOT.iterdir() if p.is_dir() and p.name != "__pycache__"} == set(LAYERS)
+    assert {p.parent.name for p in ROOT.glob("*/__init__.py")} == set(LAYERS)
