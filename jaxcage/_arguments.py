@@ -234,7 +234,7 @@ BAD_JAX = {
 
 
 def _wrong_results() -> str:
-    """What to say of this JAX; empty if it is fine."""
+    """A sentence about a version of JAX that gives wrong results; empty for all others."""
     issue = BAD_JAX.get(jax.__version__)
     return f"JAX {jax.__version__} gives wrong results ({issue}): install jax==0.10.1." if issue else ""
 

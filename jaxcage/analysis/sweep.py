@@ -1,4 +1,4 @@
-"""What the data set of a sweep says of its speeds: chaos, how long it lasts, lanes without a certain label."""
+"""Results of a sweep by speed: share of chaos, its mean life, lanes without a certain label."""
 
 import collections
 import json
@@ -27,7 +27,7 @@ def failed(found: xr.Dataset) -> Bool[np.ndarray, "*lanes"]:
 
 
 def length(found: xr.Dataset) -> str:
-    """How long lanes were run, in words."""
+    """Revolutions discarded, observed and followed, in words."""
     lasting = f", chaos followed to {found.attrs['horizon']}" if found.attrs["horizon"] else ""
     return f"{found.attrs['discard']} + {found.attrs['revolutions']} revolutions{lasting}"
 
@@ -44,7 +44,7 @@ def restless(found: xr.Dataset) -> Bool[np.ndarray, " speeds"]:
 
 
 def survival_at(found: xr.Dataset, i: int) -> Survival:
-    """How long chaos lasts at the i-th speed, from all lanes there and at the speeds next to it.
+    """Survival of chaos at the i-th speed, from all lanes there and at the speeds next to it.
 
     **Raises:** `ValueError` where lanes were not followed to a horizon.
     """
@@ -93,7 +93,7 @@ def to_decide(found: xr.Dataset) -> Float[np.ndarray, "*lanes"]:
 
 
 def cure(found: xr.Dataset) -> str:
-    """How undecided lanes get a label, as the end of a sentence; empty without an estimate."""
+    """Revolutions that would give undecided lanes a label, as the end of a sentence; empty without an estimate."""
     needed = to_decide(found)
     some = needed[(needed > 0) & np.isfinite(needed)]
     return f": about {np.max(some):.2g} observed revolutions would decide {some.size} of them" if some.size else ""

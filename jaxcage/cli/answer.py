@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Answer:
-    """What a command found. The wrapper adds the case, the time, the files and the readings of the paper."""
+    """Results of a command. The wrapper adds the case, the time, the files and the readings of the paper."""
 
     sentence: str
     """The answer itself."""

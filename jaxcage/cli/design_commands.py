@@ -136,7 +136,7 @@ def design(
 
 
 def _runs(subject: Subject, over: o.Range, means: o.MeanOptions, seed: int, **more: Any) -> tuple[Any, Any, Any]:
-    """How designs are run; of a cage the width of its chaotic speeds, and that by more speeds from other states."""
+    """Runs of designs; of a cage the width of its chaotic speeds, and that width by more speeds from other states."""
     if subject.with_rollers:
         length = means.length(starts=4, discard=10, revolutions=20)
         return jc.design.Runs.of_bearing(subject.speed(means.speed), **length, seed=seed, **more), None, None

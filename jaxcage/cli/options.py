@@ -153,7 +153,7 @@ class Range:
 
 @dataclasses.dataclass(frozen=True)
 class StepOptions:
-    """How to integrate."""
+    """Options of the integration."""
 
     solver: OptionalText = None
     """Integration method: rodas3, rodas4, rk4, newmark, tsit5, kvaerno3, kvaerno5, kencarp4."""
@@ -176,7 +176,7 @@ class StepOptions:
 
 @dataclasses.dataclass(frozen=True)
 class RunOptions(StepOptions):
-    """How long to run."""
+    """Options of the length of a run."""
 
     discard: OptionalZero = None
     """Revolutions left out at the beginning."""
@@ -193,7 +193,7 @@ class RunOptions(StepOptions):
 
 @dataclasses.dataclass(frozen=True)
 class SweepOptions(RunOptions):
-    """How long to run, and how certain labels are to be."""
+    """Options of the length of a sweep and of the certainty of its labels."""
 
     horizon: OptionalZero = None
     """Revolutions to which chaos is followed, to tell how long it lasts; 0 turns this off."""
@@ -229,7 +229,7 @@ class MeanOptions:
 
 @dataclasses.dataclass(frozen=True)
 class ShowOptions:
-    """What is written and printed."""
+    """Options of output."""
 
     out: Annotated[str, text("name a folder")] = "out"
     """Folder for figures and data; it is made if need be."""

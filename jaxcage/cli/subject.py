@@ -140,12 +140,12 @@ class Subject:
 
     @property
     def certain(self) -> "Subject":
-        """The same without ranges, for answers that have taken them into account."""
+        """This case without its ranges, for answers that have taken them into account."""
         return dataclasses.replace(self, file=self.file and dataclasses.replace(self.file, unknowns=()))
 
     @property
     def document(self) -> dict[str, Any]:
-        """What every document says of the case."""
+        """Entries of the case in every document."""
         readings = jc._parameters.readings_of(self.model).items()
         found: dict[str, Any] = {"readings": {name: chosen for name, (chosen, _) in readings}}
         found |= {} if self.shaft is None else {"cage_speed_ratio": 1 / self.shaft}
@@ -156,7 +156,7 @@ class Subject:
 
     @property
     def notes(self) -> list[str]:
-        """The same in sentences."""
+        """Sentences about the readings, the template's values and the best guesses of the case."""
         said, readings = self.document, jc.show.readings_words(self.model)
         each = {
             "Readings": [readings] if readings else [],

@@ -7,7 +7,7 @@
 | `newton`          | Newton's method for orbits, damped; derivatives by the implicit function theorem    |
 | `orbit`           | periodic orbits, their multipliers, and the determinant these must have             |
 | `point`           | bifurcation points: kinds, and matrices and functions that vanish there             |
-| `step_control`    | step control of continuation: predictions, accepted and refused steps               |
+| `step_lengths`    | step control of continuation: predictions, accepted and refused steps               |
 | `continuation`    | pseudo-arclength continuation, an iterator with corrector, step control and events  |
 | `location`        | bifurcations between orbits of a branch, compared with every change of stability    |
 | `branch`          | branches of orbits with their bifurcations; period-doubling cascades                |
@@ -53,7 +53,7 @@ from .search import (
     coexisting_orbits as coexisting_orbits,
     synchronous_orbits as synchronous_orbits,
 )
-from .step_control import StepControl as StepControl
+from .step_lengths import StepControl as StepControl
 from .unstable_ranges import (
     Explained as Explained,
     LossZones as LossZones,

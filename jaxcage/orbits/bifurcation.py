@@ -21,7 +21,6 @@ from .newton import AbstractEquations, Found, as_root, refined
 from .orbit import Orbit, PointGuess, guess_state, periodic_orbit, sorted_multipliers
 from .point import Kind, Outcome, Point, bordered, null_vectors, require_found, singular_matrix, to_critical, value_at
 from .problem import SPEED, Given, OrbitProblem, Parameter, Prepared, frozen, is_traced, make_problem, name_of
-from .step_control import Points, StepControl
 from .step_counts import (
     BY_OTHERS,
     ENOUGH,
@@ -33,6 +32,7 @@ from .step_counts import (
     other_steps,
     with_fallback,
 )
+from .step_lengths import Points, StepControl
 
 
 TANGENTIAL = 1e-2  # smallest change of |mu| for a relative change of the parameter by 1 at a crossing

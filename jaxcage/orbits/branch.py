@@ -31,8 +31,8 @@ from .location import Place, bifurcations_of
 from .orbit import NearOrbit, Orbit, guess_state
 from .point import CRITICAL, UNEXPLAINED, Outcome, Point, require_found, test_functions, value_at
 from .problem import SPEED, Given, Parameter, name_of
-from .step_control import Points, StepControl
 from .step_counts import SETTLED
+from .step_lengths import Points, StepControl
 
 
 FEIGENBAUM = 4.669201609102990

@@ -25,8 +25,8 @@ from .newton import TOLERANCE, AbstractEquations, solve
 from .orbit import OrbitEquations
 from .point import eigenvalues
 from .problem import SPEED, Given, Parameter, make_problem
-from .step_control import Points, StepControl
 from .step_counts import GIVEN_UP, SETTLED, Counts, by_rodas4, by_steps, counted
+from .step_lengths import Points, StepControl
 
 
 CHUNK = 8  # points per call: up to eight cost what one does, since they share the processor's instructions

@@ -17,8 +17,8 @@ from .bifurcation import PointEquations
 from .continuation import Continuation, ContinuationProblem, Path, first_points, in_parallel
 from .point import Point, null_vectors, require_found, singular_matrix
 from .problem import SPEED, Given, make_problem, value_of
-from .step_control import StepControl
 from .step_counts import ENOUGH, by_steps, counted
+from .step_lengths import StepControl
 
 
 @dataclasses.dataclass(frozen=True)

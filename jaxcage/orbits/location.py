@@ -15,8 +15,8 @@ from jaxtyping import Float
 
 from .continuation import ContinuationProblem, correct
 from .point import UNEXPLAINED, test_functions, to_critical
-from .step_control import Points
 from .step_counts import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
+from .step_lengths import Points
 
 
 WIDER = (0, 1, 3)  # a bifurcation that is not where it was seen is looked for this many orbits further out

@@ -28,7 +28,7 @@ from .continuation import ContinuationProblem, orbit_curves
 from .orbit import Orbit, periodic_orbit
 from .point import Point
 from .problem import SPEED, Given
-from .step_control import StepControl
+from .step_lengths import StepControl
 
 
 ROUND, ROUNDS = 4, 8  # branches followed at a time, and how often

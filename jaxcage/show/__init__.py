@@ -64,7 +64,6 @@ from .design_figures import (
 )
 from .design_tables import (
     before_and_after_table as before_and_after_table,
-    budget_record as budget_record,
     budget_table as budget_table,
     changed_table as changed_table,
     optima_table as optima_table,

@@ -6,7 +6,7 @@ from typing import Any
 
 from .._parameters import parameter_info, parameters
 from ..design import BeforeAfter, Optimised, SobolIndices, ToleranceBudget
-from .tables import SHOWN, Column, Table, chosen, rows_table
+from .tables import SHOWN, Column, Table, rows_table
 
 
 MOST = 8
@@ -76,8 +76,3 @@ def budget_table(budget: ToleranceBudget, tolerance: float) -> Table:
     name = budget.name.replace("_", " ").capitalize()
     title = f"{name} of {budget.value:.5g} {unit} under +-{tolerance:g} %: standard deviation {budget.total:.3g} {unit}"
     return rows_table(title.rstrip(), rows, columns)
-
-
-def budget_record(budget: ToleranceBudget) -> dict[str, Any]:
-    """A tolerance budget for a document."""
-    return chosen(budget, "name unit value total deviation error elasticity")
