@@ -111,7 +111,7 @@ class Around:
     driving_force: Float[np.ndarray, " bins"]
     """Mean pocket force by which a roller there drives the cage, times without contact counted as zero [N]."""
     braking_force: Float[np.ndarray, " bins"]
-    """The same for a roller that holds the cage back."""
+    """Mean pocket force by which a roller there holds the cage back [N]."""
     largest_force: Float[np.ndarray, " bins"]
     """Largest pocket force at a sample."""
 

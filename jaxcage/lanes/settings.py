@@ -89,9 +89,3 @@ class Run:
         if not self.exponent_revolutions:
             return self.blocks
         return min(self.blocks, max(2, -(-self.exponent_revolutions // self.block)))
-
-    @property
-    def length(self) -> str:
-        """How long lanes run, in words."""
-        lasting = f", chaos followed to {self.horizon}" if self.horizon else ""
-        return f"{self.discard} + {self.revolutions} revolutions{lasting}"
