@@ -137,8 +137,11 @@ def test_slow_spirals_are_not_called_quasi_periodic(revolutions: int):
 
 
 def test_labels_of_short_runs_of_a_cage_are_undecided_and_the_default_decides():
-    """Case 1a from 13 000 to 18 000 rpm: slow spirals onto periodic orbits, the slowest with a multiplier of 0.997."""
-    model, speeds = jc.case("1a"), jc.rpm(13000, 18000, 11)
+    """Case 1a from 13 000 to 17 500 rpm: slow spirals onto periodic orbits, the slowest with a multiplier of 0.997.
+
+    At 18 000 rpm a chaotic transient leads to one of two orbits, and rounding decides to which.
+    """
+    model, speeds = jc.case("1a"), jc.rpm(13000, 17500, 10)
     short = jc.sweep(model, speeds, discard=200, revolutions=60, confirm=False, horizon=0)
     assert not np.any(short["label"] == "quasi-periodic") and np.mean(short["label"] == "undecided") > 0.8
     assert np.all(jc.sweep(model, speeds).label == "periodic-1")
