@@ -28,7 +28,6 @@ from .chances import (
     ensemble as ensemble,
     verdict_of as verdict_of,
 )
-from .edges import EdgeClearance as EdgeClearance, FollowedEdges as FollowedEdges, StabilityMargin as StabilityMargin
 from .identification import Narrowed as Narrowed, identify as identify, misses as misses, narrow as narrow
 from .lasting import LastingEdge as LastingEdge, lasting_edge as lasting_edge, lasting_edges as lasting_edges
 from .loads import (

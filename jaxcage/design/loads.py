@@ -89,7 +89,7 @@ def averages(
     return mean, largest
 
 
-def _land_force(model: CageModel, speed: Array, tau: Array, state: Any) -> tuple[Array, Array, Array]:
+def land_reading(model: CageModel, speed: Array, tau: Array, state: Any) -> tuple[Array, Array, Array]:
     """Size of the land's contact force on the cage [N], power to shear the film [W], distance of the cage's centre from
     that of its guide [m]."""
     n = len(state) // 2
@@ -98,14 +98,17 @@ def _land_force(model: CageModel, speed: Array, tau: Array, state: Any) -> tuple
         q, v = (q[0] - q[2], q[1] - q[3]), (v[0] - v[2], v[1] - v[3])
     forces = model.cage_at(speed).forces(tau, *q, *v)
     fx, fy, _ = forces["contact"]
-    return jnp.sqrt(fx * fx + fy * fy), -forces["film"][2] * speed, jnp.sqrt(q[0] * q[0] + q[1] * q[1])
+    square = fx * fx + fy * fy
+    touches = square > 0  # the root has no derivative at 0
+    force = jnp.where(touches, jnp.sqrt(jnp.where(touches, square, 1.0)), 0.0)
+    return force, -forces["film"][2] * speed, jnp.sqrt(q[0] * q[0] + q[1] * q[1])
 
 
 def loads_of_lanes(
     models: Sequence[CageModel], found: xr.Dataset, revolutions: int = 4, method: AbstractMethod | None = None
 ) -> dict[str, Float[np.ndarray, "designs speeds starts"]]:
     """Loads of the land and least film in each lane of a sweep of designs; NaN where a lane failed."""
-    mean, largest = averages(models, found, _land_force, revolutions, method)
+    mean, largest = averages(models, found, land_reading, revolutions, method)
     radius, clearance = np.array([(float(m.land_radius), float(m.clearance)) for m in models]).T[:, :, None, None]
     return {
         "wear load": mean[..., 0] * found["speed"].values[:, None] * radius,

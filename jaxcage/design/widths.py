@@ -1,3 +1,6 @@
+from __future__ import annotations
+
+
 """Widths of zones between edges of any kind, and their change with the design."""
 
 import dataclasses
@@ -8,7 +11,6 @@ from typing import overload
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..orbits import Sensitivity
-from .edges import EdgeSum, FollowedEdges
 from .lasting import LastingEdge
 
 

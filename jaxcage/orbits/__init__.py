@@ -13,9 +13,10 @@
 | `branch`          | branches of orbits with their bifurcations; period-doubling cascades                |
 | `bifurcation`     | Newton's method for bifurcation points                                              |
 | `curves`          | curves of bifurcation points in two parameters                                      |
+| `following`       | edges followed from one design to another                                           |
 | `search`          | search for orbits without a hint of where they are                                  |
 | `unstable_ranges` | unstable ranges of the synchronous orbit; mechanisms of chaotic edges               |
-| `gradient`        | derivatives and elasticities of edges, derivatives of the largest multiplier        |
+| `gradient`        | derivatives and elasticities of edges, derivatives of orbits and multipliers        |
 """
 
 from .._arguments import check_layer
@@ -27,12 +28,13 @@ from .branch import (
     cascade as cascade,
 )
 from .curves import Curve as Curve, curve as curve
+from .following import Followed as Followed, follow as follow, follow_all as follow_all
 from .gradient import (
-    LeadingMultiplier as LeadingMultiplier,
+    OrbitSlopes as OrbitSlopes,
     Sensitivity as Sensitivity,
     edge_speed as edge_speed,
-    leading_multiplier as leading_multiplier,
     limit_sensitivity as limit_sensitivity,
+    orbit_slopes as orbit_slopes,
     sensitivities as sensitivities,
     sensitivity as sensitivity,
     width as width,
@@ -48,9 +50,10 @@ from .orbit import (
 from .point import Point as Point
 from .problem import pick as pick
 from .search import (
+    StableRange as StableRange,
     Stretch as Stretch,
     SynchronousOrbits as SynchronousOrbits,
-    coexisting_orbits as coexisting_orbits,
+    stable_range as stable_range,
     synchronous_orbits as synchronous_orbits,
 )
 from .step_lengths import StepControl as StepControl
@@ -64,6 +67,6 @@ from .unstable_ranges import (
 
 check_layer(
     globals(),
-    "bifurcation branch cascade coexisting_orbits curve "
-    "explain leading_multiplier loss_zones periodic_orbit sensitivities sensitivity synchronous_orbits",
+    "bifurcation branch cascade curve "
+    "explain follow loss_zones periodic_orbit sensitivities sensitivity stable_range synchronous_orbits",
 )

@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+from typing import cast
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,10 +16,10 @@ from ..models import AbstractForcedSystem
 from ..solve import AbstractMethod
 from .bifurcation import PointEquations
 from .continuation import Continuation, ContinuationProblem, Path, first_points, in_parallel
-from .point import Point, null_vectors, require_found, singular_matrix
-from .problem import SPEED, Given, make_problem, value_of
+from .point import Kind, Point, null_vectors, require_found, singular_matrix
+from .problem import SPEED, Given, Parameter, make_problem, value_of
 from .step_counts import ENOUGH, by_steps, counted
-from .step_lengths import StepControl
+from .step_lengths import Points, StepControl
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,31 +88,13 @@ def curve(
         said = f"must have the system's {y} between them, {own:g}, but are {lower:g} and {upper:g}."
         raise ArgumentError("lower", "upper", said=said)
     low, high = np.array([x_lower, lower]), np.array([x_upper, upper])
-    chosen, counts = counted(method)
     given = Given(system, jnp.asarray(point.speed, dtype=float))
-    orbit = make_problem(given, (x, y), (high - low) / 20, point.periods, chosen)
-    scale = np.asarray(orbit.scale)
-    count = int(point.steps) or min(int(counts.last), ENOUGH)
-    z = jnp.asarray(np.asarray(point.state) / scale)
-    there = jnp.append(z, jnp.asarray([float(point.value), own]) / orbit.units)
-    _, monodromy = orbit.returned(by_steps(orbit, count).prepare(there, given), z)
-    borders = null_vectors(singular_matrix(point.kind, monodromy))
-    problem = ContinuationProblem(PointEquations(orbit, *borders, point.kind), given, counts, low, high)
+    problem, start = point_curve(given, (x, y), (high - low) / 20, (low, high), point, own, method)
     problem.require_inside("point", float(point.value))
-    u = problem.unknowns(point.state, float(point.value), own)
-    start = first_points(problem, u[None], np.eye(1, u.size, u.size - 1), count // 2)  # at this value of y
     if not bool(start.converged[0]):
         said = f"must be a {point.kind} of the system, but Newton's method finds none there."
         raise ArgumentError("point", said=said)
-
-    def followed(sign: float) -> Path:
-        walk = Continuation(problem, start.turned(sign), steps, oriented=False)
-        for advanced in walk:
-            for one in advanced:
-                walk.problem = _with_fresh_borders(walk.problem, one)
-        return walk.curves[0]
-
-    up, down = in_parallel(followed, [1.0, -1.0])
+    up, down = in_parallel(lambda sign: follow_curve(problem, start.turned(sign), steps), [1.0, -1.0])
     points = up.row.after(down.row)
     multipliers, values = problem.multipliers(points), problem.values(points.u)
     genuine = np.array([point.kind != "Neimark-Sacker" or _is_on_circle(mu) for mu in multipliers])
@@ -120,6 +103,40 @@ def curve(
     return Curve(
         point.kind, x, y, values[:, 0], values[:, 1], states, multipliers, genuine, ended, name, points.steps, error
     )
+
+
+def point_curve(
+    given: Given,
+    parameters: tuple[Parameter, Parameter],
+    units: Float[np.ndarray, " 2"],
+    limits: tuple[np.ndarray, np.ndarray],
+    point: Point,
+    second: float,
+    method: AbstractMethod | None,
+) -> tuple[ContinuationProblem, Points]:
+    """Return the problem of the curve through a bifurcation point over two parameters, and its first point.
+
+    **Arguments:** system; parameters, their units and limits [SI]; the point, and its value of the second parameter.
+    """
+    chosen, counts = counted(method)
+    orbit = make_problem(given, parameters, units, point.periods, chosen)
+    count = int(point.steps) or min(int(counts.last), ENOUGH)
+    z = jnp.asarray(np.asarray(point.state) / np.asarray(orbit.scale))
+    there = jnp.append(z, jnp.asarray([float(point.value), second]) / orbit.units)
+    _, monodromy = orbit.returned(by_steps(orbit, count).prepare(there, given), z)
+    borders = null_vectors(singular_matrix(cast(Kind, point.kind), monodromy))
+    problem = ContinuationProblem(PointEquations(orbit, *borders, cast(Kind, point.kind)), given, counts, *limits)
+    u = problem.unknowns(point.state, float(point.value), second)
+    return problem, first_points(problem, u[None], np.eye(1, u.size, u.size - 1), count // 2)
+
+
+def follow_curve(problem: ContinuationProblem, start: Points, steps: StepControl) -> Path:
+    """Follow a curve of bifurcation points in the direction of its first tangent, until it leaves its limits."""
+    walk = Continuation(problem, start, steps, oriented=False)
+    for advanced in walk:
+        for one in advanced:
+            walk.problem = _with_fresh_borders(walk.problem, one)
+    return walk.curves[0]
 
 
 def _is_on_circle(multipliers: np.ndarray) -> bool:

@@ -11,16 +11,16 @@ gives all derivatives, for every kind of edge and for the largest multiplier of 
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Complex, Float
 
-from .._arguments import require_at_least, require_x64
+from .._arguments import require_x64
 from .._errors import ArgumentError
 from .._form import compiled
 from .._notebook import notebook_html
@@ -31,8 +31,8 @@ from .bifurcation import TANGENTIAL, PointEquations, critical_rate
 from .branch import FEIGENBAUM, Cascade
 from .continuation import in_parallel
 from .newton import FieldNumbers, around_root, expansion, numbers_around, numbers_of
-from .orbit import OrbitEquations, StateLike, periodic_orbit, sorted_multipliers
-from .point import Kind, Point, null_vectors, singular_matrix
+from .orbit import Orbit, OrbitEquations, sorted_multipliers
+from .point import Kind, Point, eigenvalues, null_vectors, singular_matrix
 from .problem import SPEED, Given, OrbitProblem, make_problem
 from .step_counts import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, with_fallback
 
@@ -42,6 +42,7 @@ ITERATIONS = 6
 POLISHED, SETTLED_TO, NEARBY = 1e-11, 1e-7, 0.5
 """Limits of Newton's method, in units of the system's scale and of a tenth of the speed: it ends with a step below the
 first, the step must be below the second, and it may lead no further from the guess than the third."""
+OUTSIDE = 1e-6  # distance from the unit circle beyond which a multiplier is outside
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,11 +67,21 @@ class Sensitivity:
     state: Float[np.ndarray, " dim"] | None = None
     error_rpm: float = float("nan")
     steps: int = 0
+    multipliers: Complex[np.ndarray, " dim"] | None = None
 
     @property
     def trusted(self) -> bool:
         """Whether the value is a function of the design here."""
         return self.status == "converged"
+
+    @property
+    def bounds(self) -> bool:
+        """Whether a stable orbit ends here: no multiplier but the critical ones is outside the unit circle."""
+        if self.multipliers is None:
+            return False
+        critical = 2 if self.kind == "Neimark-Sacker" else 1
+        nearest = np.sort(np.abs(np.abs(self.multipliers) - 1))[:critical]
+        return int(np.sum(np.abs(self.multipliers) > 1 + nearest.max() + OUTSIDE)) == 0
 
     def __str__(self) -> str:
         order = sorted(self.elasticity, key=lambda n: -abs(self.elasticity[n]))
@@ -105,6 +116,7 @@ class _Edge(NamedTuple):
     residual: Array
     weight: Array
     rate: float
+    monodromy: Array
     error: float = float("nan")
     steps: int = 0
 
@@ -126,8 +138,8 @@ class _Edge(NamedTuple):
 @compiled
 def _unfold(
     kind: Kind, problem: OrbitProblem, u: Array, numbers: FieldNumbers, around: Any, slopes: Any
-) -> tuple[Array, Array, Array]:
-    """Return Newton's step to the bifurcation near the unknowns u, and weight and rate there (see `_Edge`)."""
+) -> tuple[Array, Array, Array, Array]:
+    """Return Newton's step to the bifurcation near the unknowns u; weight, rate and monodromy there (see `_Edge`)."""
     n, m, unit = problem.dimension, u.size, problem.units[0]
     borders = null_vectors(singular_matrix(kind, around[1]))
     equations = PointEquations(problem, *borders, kind)
@@ -135,7 +147,7 @@ def _unfold(
     jacobian = of_r[:, :m] + of_r[:, m:] @ numbers.of_u
     adjoint = jnp.linalg.solve(jacobian.T, jnp.zeros(m).at[-1].set(1.0))
     rate = critical_rate(kind, n, jacobian, known, borders) / unit
-    return jnp.linalg.solve(jacobian, r), -(adjoint @ of_r[:, m:]) * unit, rate
+    return jnp.linalg.solve(jacobian, r), -(adjoint @ of_r[:, m:]) * unit, rate, known.monodromy
 
 
 def _located(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None) -> _Edge:
@@ -169,11 +181,11 @@ def _polished(problem: OrbitProblem, given: Given, kind: Any, first: Array) -> _
     left = ITERATIONS
     while True:
         numbers = numbers_around(orbit, u, given)
-        step, weight, rate = _unfold(kind, problem, u, numbers, *expansion(problem, u, numbers))
+        step, weight, rate, monodromy = _unfold(kind, problem, u, numbers, *expansion(problem, u, numbers))
         leads = jnp.max(jnp.abs(u - step - first))
         goes_on = (jnp.max(jnp.abs(step)) > POLISHED) & (leads < NEARBY)  # not if it is there, lost, or not a number
         if not (left and bool(goes_on)):
-            return _Edge(problem, u, step, weight, float(rate))
+            return _Edge(problem, u, step, weight, float(rate), monodromy)
         u, left = u - step, left - 1
 
 
@@ -222,6 +234,7 @@ def sensitivity(
         state=np.asarray(edge.problem.state(edge.u)),
         error_rpm=edge.error / PER_RPM,
         steps=edge.steps,
+        multipliers=eigenvalues(np.asarray(edge.monodromy)),
     )
 
 
@@ -280,46 +293,48 @@ def _combined(name: str, kind: str, parts: Sequence[tuple[float, Sensitivity]]) 
     )
 
 
-class LeadingMultiplier(NamedTuple):
-    """The largest multiplier of the orbit near a guess, NaN if there is none: its size |mu|, d|mu| / d parameter [SI],
-    and the state of the orbit at phase 0 [SI]."""
+class OrbitSlopes(NamedTuple):
+    """The size of the largest multiplier of an orbit, its derivatives by design variables, shape (n,), and those of the
+    state at phase 0 [SI], shape (dim, n)."""
 
-    size: float
-    derivative: dict[str, float]
-    state: Float[np.ndarray, " dim"]
+    multiplier: float
+    multiplier_slope: Float[np.ndarray, " n"]
+    state_slope: Float[np.ndarray, "dim n"]
 
 
 @compiled
-def _largest(monodromy: Array, of_r: Array, of_monodromy: Array) -> tuple[Array, Array]:
-    """Return |mu| of the largest multiplier, and its derivatives by the numbers of the field."""
+def _numbers_by(
+    problem: OrbitProblem, u: Array, speed: Array, designs: Callable[[Array], AbstractForcedSystem], at: Array
+) -> Array:
+    """Return the derivatives of the field's numbers by the design variables."""
+    return jax.jacfwd(lambda x: numbers_of(problem.prepare(u, Given(designs(x), speed)))[0])(at)
+
+
+@compiled
+def _orbit_moves(monodromy: Array, of_r: Array, of_monodromy: Array, by_design: Array) -> tuple[Array, Array, Array]:
+    """Return |mu| of the largest multiplier, its derivatives, and those of the unknowns, by the design variables."""
     n = monodromy.shape[0]
     size, weight = jax.value_and_grad(lambda m: jnp.abs(sorted_multipliers(m)[0]))(monodromy)
     moved = -jnp.linalg.solve(of_r[:, :n], of_r[:, n:])
-    return size, jnp.einsum("ij,ijk->k", weight, of_monodromy[..., n:] + of_monodromy[..., :n] @ moved)
+    of_numbers = jnp.einsum("ij,ijk->k", weight, of_monodromy[..., n:] + of_monodromy[..., :n] @ moved)
+    return size, of_numbers @ by_design, moved @ by_design
 
 
-def leading_multiplier(
-    system: AbstractForcedSystem,
-    speed: float,
-    guess: StateLike,
-    *,
-    periods: int = 1,
-    method: AbstractMethod | None = None,
-) -> LeadingMultiplier:
-    """Return the size of the largest multiplier of the orbit near `guess` (a state, SI), and its derivatives.
+def orbit_slopes(
+    designs: Callable[[Array], AbstractForcedSystem], at: Float[np.ndarray, " n"], orbit: Orbit
+) -> OrbitSlopes:
+    """Return how an orbit and its largest multiplier change with the design, by the implicit function theorem.
 
-    **Arguments:** a system whose parameters are declared, such as `CageModel`; speed [rad/s]; guess; revolutions after
-    which the orbit closes; integration method. If two multipliers are equal in size, one of them is taken.
+    **Arguments:** the system as a function of design variables, a module; the values of these at which `orbit` was
+    found. If two multipliers are equal in size, one of them is taken.
     """
-    require_at_least(1, periods=periods)
-    orbit = periodic_orbit(system, speed, periods, guess=guess, method=method)
-    if not bool(orbit.converged):
-        nan = float("nan")
-        return LeadingMultiplier(nan, dict.fromkeys(parameter_paths(system), nan), np.asarray(orbit.state))
-    given = Given(system, jnp.asarray(speed, dtype=float))
-    problem = make_problem(given, (), jnp.ones(0), periods, orbit.method)
+    at = jnp.asarray(at, dtype=float)
+    given = Given(designs(at), jnp.asarray(orbit.speed, dtype=float))
+    problem = make_problem(given, (), jnp.ones(0), orbit.periods, orbit.method)
     equations, u = OrbitEquations(problem), orbit.state / problem.scale
     numbers = numbers_around(equations, u, given)
     (_, monodromy), slopes = around_root(equations, u, numbers, *expansion(problem, u, numbers))
-    size, weight = _largest(monodromy, *slopes)
-    return LeadingMultiplier(float(size), _pulled_back(problem, given, u, weight), np.asarray(orbit.state))
+    by_design = _numbers_by(problem, u, given.speed, designs, at)
+    size, multiplier, unknowns = _orbit_moves(monodromy, *slopes, by_design)
+    state = np.asarray(problem.scale)[:, None] * np.asarray(unknowns)
+    return OrbitSlopes(float(size), np.asarray(multiplier), state)

@@ -10,22 +10,17 @@ import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from .._arguments import require_at_least, require_x64
-from .._form import compiled
+from .._arguments import require_at_least
 from .._notebook import notebook_html
-from .._types import Scalar
 from ..lanes import initial_states, sweep
-from ..models import AbstractForcedSystem, require_speeds
-from ..solve import AbstractMethod, strobe_map
+from ..models import AbstractForcedSystem
+from ..solve import AbstractMethod
 from .branch import Branch, follow_both_ways
 from .continuation import ContinuationProblem, orbit_curves
-from .orbit import Orbit, periodic_orbit
 from .point import Point
 from .problem import SPEED, Given
 from .step_lengths import StepControl
@@ -33,6 +28,9 @@ from .step_lengths import StepControl
 
 ROUND, ROUNDS = 4, 8  # branches followed at a time, and how often
 PATIENCE = 150  # unstable orbits in a row after which a branch is not followed further
+TRIES = 3  # branches followed where one stable range is wanted
+PATIENCE_OUT = 3  # the same where only the stable orbits on both sides are wanted
+OUTWARD = StepControl(first=0.05, longest=0.5, most=400)  # steps along the orbits of a stable range
 ON_BRANCH = 0.03  # largest distance of an orbit on a branch from the branch, in units of the system's scale
 SPREAD = 0.6  # random initial states are spread over this share of the system's scale in every direction
 SAME = 1e-4  # largest distance of equal orbits: one that hardly attracts moves by a hundred times its map's error
@@ -319,46 +317,67 @@ def _merged(pieces: Sequence[_Piece], scale: Scale) -> list[_Piece]:
     return whole
 
 
-# --- one speed -----------------------------------------------------------------------------------------------------
+# --- one stable range -----------------------------------------------------------------------------------------------
 
 
-def coexisting_orbits(
-    system: AbstractForcedSystem,
-    speed: Scalar,
-    periods: int = 1,
-    *,
-    count: int = 24,
-    revolutions: int = 5,
-    seed: int = 0,
-    method: AbstractMethod | None = None,
-) -> list[Orbit]:
-    """Find orbits that close after `periods` revolutions and not earlier, from the system's and random initial states.
+@dataclasses.dataclass(frozen=True, eq=False)
+class StableRange:
+    """The range of speed in which a machine may run: a stable stretch of a branch of synchronous orbits.
 
-    **Arguments:** system and speed [rad/s]; number of random states and their seed; revolutions of simulation before
-    Newton's method: with few, unstable orbits are found as well.
-
-    **Returns:** distinct orbits, the stable ones first. There may be more.
+    `lower` and `upper` are the bifurcations that bound it, None where it reaches the limits of the search, and
+    `lower_speed` and `upper_speed` [rad/s] its ends. `states` are the orbits along it at `speeds`, both ascending.
     """
-    require_x64()
-    require_at_least(0, seed=seed)
-    require_at_least(1, periods=periods, count=count)
-    require_speeds(system, speed)
-    scale = np.array([float(c) for c in system.scale(speed)])
-    own = np.array([[float(c) for c in y] for y in system.starts(speed)])
-    random = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, (count, scale.size)) * scale
-    find = lambda y: periodic_orbit(system, speed, periods, guess=y, revolutions=revolutions, method=method)
-    found = jax.vmap(find)(jnp.asarray(np.concatenate([own, random])))
-    strobe = lambda orbit, y: strobe_map(system, jnp.asarray(speed, dtype=float), orbit.method)(tuple(y))
-    advance = compiled(jax.vmap(lambda orbit, y: jnp.stack(strobe(orbit, y).y)))
-    rows = [found.state]
-    for _ in range(periods - 1):
-        rows.append(advance(found, rows[-1]))
-    images = np.stack([np.asarray(row) / scale for row in rows], axis=1)
-    near = lambda a, b: bool(np.max(np.abs(a - b)) < SAME)
-    kept: list[int] = []
-    for i in np.flatnonzero(np.asarray(found.converged)):
-        shorter = any(near(images[i, 0], images[i, j]) for j in range(1, periods))
-        if not shorter and not any(near(images[i, 0], image) for k in kept for image in images[k]):
-            kept.append(int(i))
-    orbits = [jax.tree.map(lambda x: x[i] if eqx.is_array(x) and x.ndim else x, found) for i in kept]
-    return sorted(orbits, key=lambda o: float(jnp.max(jnp.abs(o.multipliers))))
+
+    lower: Point | None
+    upper: Point | None
+    lower_speed: float
+    upper_speed: float
+    speeds: np.ndarray
+    states: np.ndarray
+
+    def state_at(self, speed: float) -> np.ndarray:
+        """Return the state of the orbit at a speed [rad/s] within the range, by linear interpolation."""
+        return np.array([np.interp(speed, self.speeds, c) for c in self.states.T])
+
+
+def stable_range(
+    system: AbstractForcedSystem,
+    operating: tuple[float, float],
+    limits: tuple[float, float],
+    near: Sequence[tuple[np.ndarray, float]] = (),
+    *,
+    method: AbstractMethod | None = None,
+) -> StableRange | None:
+    """Find the stable stretch of synchronous orbits that covers most of an operating range, by following its orbits
+    out to where they lose their stability.
+
+    **Arguments:** system; operating range and limits of the search [rad/s]; states and speeds near orbits, by default
+    the ends of simulations at five speeds of the operating range from each of the system's initial states.
+
+    **Returns:** None if no stable orbit was found in the operating range. An end at which the stability changes without
+    a bifurcation that was located is None too, but lies within the limits.
+    """
+    scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
+    problem = orbit_curves(Given(system, jnp.asarray(sum(limits) / 2)), SPEED, *limits, method)
+    if near:
+        waiting = [_Settled(np.asarray(state), float(speed), 0, True) for state, speed in near]
+    else:
+        short: dict[str, Any] = {"discard": 250, "revolutions": 8, "blocks": 1, "keep": 8, "exponents": 0}
+        settled = sweep(system, np.linspace(*operating, 5), **short, method=method)
+        waiting = _stable_orbits(problem, settled, scale)
+    pieces: list[_Piece] = []
+    for _ in range(TRIES):
+        if not waiting:
+            break
+        picked = waiting[len(waiting) // 2]
+        (found,) = follow_both_ways(problem, [(picked.state, picked.speed)], OUTWARD, PATIENCE_OUT)
+        waiting = [w for w in waiting if w is not picked and not (found and _covers(found, w.speed, w.state, scale))]
+        pieces += _pieces(found, 0, (limits[0] * 30 / np.pi, limits[1] * 30 / np.pi)) if found else []
+    low, high = (end * 30 / np.pi for end in operating)
+    overlap = lambda p: min(p.stretch.upper_rpm, high) - max(p.stretch.lower_rpm, low)
+    best = max(_merged(pieces, scale), key=overlap, default=None)
+    if best is None or overlap(best) < 0:
+        return None
+    s, rise = best.stretch, np.argsort(best.rpm)
+    ends = s.lower_rpm * np.pi / 30, s.upper_rpm * np.pi / 30
+    return StableRange(s.lower, s.upper, *ends, best.rpm[rise] * np.pi / 30, best.state[rise])

@@ -8,6 +8,7 @@ import ctypes
 import functools
 import pathlib
 import re
+import threading
 from typing import Any
 
 import jax
@@ -141,9 +142,15 @@ def handler_ir(inputs: int, outputs: int) -> str:
     )
 
 
-@functools.cache
-def registered(ir: str, name: str) -> Any:
+_registered: dict[str, int] = {}
+_registering = threading.Lock()
+
+
+def registered(ir: str, name: str) -> int:
     """Have XLA know the `handler` of a module by a name; the code stays as long as the process."""
     address = function(ir, "handler")
-    jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(ctypes.c_void_p(address)), platform="cpu")
+    with _registering:  # threads may trace the same function at the same time
+        if name not in _registered:
+            jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(ctypes.c_void_p(address)), platform="cpu")
+            _registered[name] = address
     return address

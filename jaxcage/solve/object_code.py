@@ -82,10 +82,19 @@ def _linker() -> Any:
     return orcjit.create_lljit_compiler(_machine(), use_jit_link=True)
 
 
-@functools.cache
+_libraries: dict[tuple[str, str], Any] = {}
+_linking = threading.Lock()
+
+
 def _loaded(ir: str, name: str) -> Any:
-    builder = orcjit.JITLibraryBuilder().add_object_img(object_code(ir)).add_current_process()
-    return builder.export_symbol(name).link(_linker(), name + hashlib.sha256(ir.encode()).hexdigest()[:24])
+    if (ir, name) not in _libraries:
+        code = object_code(ir)
+        with _linking:  # threads may ask for the same module, and the linker takes each name once
+            if (ir, name) not in _libraries:
+                builder = orcjit.JITLibraryBuilder().add_object_img(code).add_current_process()
+                named = name + hashlib.sha256(ir.encode()).hexdigest()[:24]
+                _libraries[ir, name] = builder.export_symbol(name).link(_linker(), named)
+    return _libraries[ir, name]
 
 
 def function(ir: str, name: str) -> int:

@@ -1,0 +1,82 @@
+"""A design is checked before it is believed: simulated from many initial states over its operating range."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+
+from ..analysis import failed, restless, survival_at
+from ..lanes import initial_states, sobol, sweep
+from ..models import AbstractForcedSystem
+
+
+SPEEDS, SPREAD = 24, 0.6
+"""Speeds of the check, and the part of the scale over which initial states are spread beside the model's own."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Checked:
+    """Where simulations of a design ended, over speeds [rpm] of its operating range.
+
+    `shares` are those of the lanes by label; `chaotic_rpm` the speeds at which chaos coexists with the calm orbit and
+    `mean_life` how many revolutions it lasts there in the mean, infinite where none ended.
+    """
+
+    speeds_rpm: Float[np.ndarray, " speeds"]
+    starts: int
+    shares: dict[str, float]
+    failed: int
+    chaotic_rpm: Float[np.ndarray, " chaotic"]
+    mean_life: Float[np.ndarray, " chaotic"]
+    method: str
+
+    @property
+    def calm_share(self) -> float:
+        """Share of the lanes that ended on a period-1 orbit."""
+        return self.shares.get("periodic-1", 0.0)
+
+    @property
+    def calm(self) -> bool:
+        """Whether all lanes ended on a period-1 orbit."""
+        return self.calm_share == 1.0
+
+    def __str__(self) -> str:
+        said = (
+            f"{100 * self.calm_share:.1f} % of {self.starts} initial states at {self.speeds_rpm.size} speeds end calm"
+        )
+        if not self.chaotic_rpm.size:
+            return said
+        ends = f"{self.chaotic_rpm.min():.0f} to {self.chaotic_rpm.max():.0f} rpm"
+        return f"{said}; chaos coexists at {self.chaotic_rpm.size} speeds, {ends}"
+
+
+def check_design(
+    model: AbstractForcedSystem,
+    operating: tuple[float, float],
+    starts: int = 16,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Checked:
+    """Simulate a design from its own initial states and from random ones, `starts` in all, over its operating range.
+
+    The method is machine code with adaptive steps: other steps than those of the orbits that the search followed.
+    """
+    speeds = np.linspace(*operating, SPEEDS)
+    own = np.asarray(initial_states(model, speeds, None))[:, :starts]
+    scale = np.array([[float(c) for c in model.scale(s)] for s in speeds])
+    drawn = SPREAD * (2 * sobol(scale.shape[1], max(starts - own.shape[1], 1), 0) - 1)[: starts - own.shape[1]]
+    states = np.concatenate([own, drawn * scale[:, None]], axis=1)
+    told = (lambda done, of: progress("check", done, of)) if progress else None
+    found = sweep(model, speeds, starts=states, progress=told)
+    labels, counts = np.unique(found["label"].values, return_counts=True)
+    lost = int(np.sum(failed(found)))
+    where = np.flatnonzero(restless(found))
+    return Checked(
+        speeds * 30 / np.pi,
+        states.shape[1],
+        dict(zip(labels.tolist(), (counts / counts.sum()).tolist(), strict=True)),
+        lost,
+        speeds[where] * 30 / np.pi,
+        np.array([survival_at(found, int(i)).mean_life for i in where]),
+        str(found.attrs.get("method", "")),
+    )
