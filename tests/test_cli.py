@@ -19,7 +19,7 @@ from jaxcage.files import ConfigError, load_model, read_bytes
 
 COMMANDS = (
     "init simulate sweep zones bifurcations gradient compare runup map study design sensitivity unknowns identify "
-    "poincare statics impact reproduce report"
+    "poincare statics impact report"
 ).split()
 STUDY = "study 1a --vary speed=9000:12000:3"
 GAP = f"{STUDY} --vary guidance_gap"
@@ -85,7 +85,6 @@ REFUSED = [
     ("unknowns 1a", "must be a TOML file with ranges"),
     ("report 1a --operating fast", "--operating must be speeds"),
     ("gradient 1a --speed 1e4", "--speed goes with a bearing"),
-    ("reproduce --constants best", "--constants"),
     ("--tyro-print-completion nonsense", "'nonsense'"),
     # Whole bearings.
     ("bifurcations nu2310", "takes a cage"),
@@ -139,8 +138,8 @@ def test_nan_and_infinity_are_refused_in_every_option(
     assert main([command, "--help"]) == 0
     listed = capsys.readouterr().out
     flags = re.findall(r"^[│ ] +(--[a-z-]+) (?:INT|FLOAT|RPM)\b", listed, flags=re.M)
-    assert flags or command in ("unknowns", "identify", "reproduce")
-    cases = {"compare": ["1a", "1b"], "identify": ["1a", "data.csv"], "reproduce": []}.get(command, ["1a"])
+    assert flags or command in ("unknowns", "identify")
+    cases = {"compare": ["1a", "1b"], "identify": ["1a", "data.csv"]}.get(command, ["1a"])
     speed = ["--speed=8500"] if command in ("simulate", "poincare", "impact") else []
     for flag in flags:
         for wrong in ("nan", "inf", "-inf"):

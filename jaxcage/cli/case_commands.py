@@ -1,8 +1,8 @@
-"""Commands about the case itself: its file, its statics, one impact, the paper's results, a report."""
+"""Commands about the case itself: its file, its statics, one impact, a report."""
 
 import shlex
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import tyro
@@ -15,9 +15,6 @@ from .answer import Answer, drawn
 from .progress import visible
 from .speed_commands import draw, zone_tables
 from .subject import RPM, read_case
-
-
-QUICK: dict[str, Any] = {"speeds": 101, "discard": 150, "revolutions": 100, "section_revolutions": 504, "orbits": False}
 
 
 def init(
@@ -126,30 +123,6 @@ def impact(
     figure = drawn(where, lambda ax: jc.show.impact_forces(found, ax), 7.0, 4.0)
     files = {"figure": (f"{stem}.png", figure), "data": (f"{stem}.csv", columns)}
     return Answer(said, [table], [note], subject.both(at) | values | {"bar": bar}, subject, files)
-
-
-def reproduce(
-    *,
-    constants: Literal["identified", "preliminary"] = "identified",
-    quick: o.Quick = False,
-    show: o.ShowOptions = o.ShowOptions(),
-) -> Answer:
-    """The paper beside this model: edges, conclusions, and the orbit diagrams of figures 7 and 8.
-
-    Args:
-        constants: Set of constants that the paper does not print.
-    """
-    from ..show import reproduction
-
-    models = {name: jc.case(name, constants) for name in jc.bearing.PUBLISHED_CASES}
-    with show.computing("reproduce") as say:
-        runs = reproduction.run_all(models, report=say, **(QUICK if quick else {}))
-        document, tables, notes = reproduction.reproduction(runs)
-    verdicts = [each["verdict"] for each in document["conclusions"]]
-    partly = f"{verdicts.count('holds in part')} in part"
-    said = f"{verdicts.count('holds')} of the paper's {len(verdicts)} conclusions hold, {partly}."
-    files = {name: (f"_{name}.png", figure) for name, figure in reproduction.paper_diagrams(runs)}
-    return Answer(said, tables, notes, {"quick": quick, "constants": constants, **document}, files=files)
 
 
 def report(

@@ -34,7 +34,7 @@ OK, FAILED, BAD_INPUT = 0, 1, 2
 FUNCTIONS: tuple[Callable[..., Answer], ...] = (
     *(case.init, speed.simulate, speed.sweep, orbit.zones, orbit.bifurcations, orbit.gradient, speed.compare),
     *(speed.runup, orbit.map_, speed.study, design.design, design.sensitivity, design.unknowns, design.identify),
-    *(speed.poincare, case.statics, case.impact, case.reproduce, case.report),
+    *(speed.poincare, case.statics, case.impact, case.report),
 )
 COMMANDS = {function.__name__.rstrip("_"): function for function in FUNCTIONS}
 COMPLETION, SHELLS = ("--tyro-print-completion", "--tyro-write-completion"), ("bash", "zsh", "tcsh", "fish")

@@ -14,7 +14,6 @@
 | `design_figures`  | elasticities, searches for better designs, chances of chaos           |
 | `sources`         | parameters with their sources                                         |
 | `operating`       | operating speeds compared with zones                                  |
-| `reproduction`    | the paper's edges, conclusions and diagrams beside the model's        |
 | `findings`        | everything that a report shows, computed                              |
 | `sections`        | sections of the report                                                |
 | `checks`          | tables of checks and settings for the report                          |
