@@ -9,7 +9,6 @@ import pytest
 from helpers import document, is_png, refused
 
 import jaxcage as jc
-from jaxcage.cli import main
 from jaxcage.design import Runs, mean_gradient
 from jaxcage.files import subject_of, whole_bearing_from
 from jaxcage.lanes import load, stored_configuration
@@ -116,7 +115,6 @@ def test_study(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     np.testing.assert_allclose(stored["speed"], jc.rpm(1.0) * np.array([9000, 5000 / ratio]))
     again = document(capsys, *asked)
     assert again["stored_before"] == again["stored"] == 4
-    assert main(["study", "nu2310", "--check", "--out", str(tmp_path)]) == 0
 
 
 @pytest.mark.wide

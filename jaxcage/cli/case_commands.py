@@ -11,7 +11,7 @@ import jaxcage as jc
 
 from .._errors import InputError
 from . import options as o
-from .answer import Answer, drawn
+from .answer import Answer
 from .progress import visible
 from .speed_commands import draw, zone_tables
 from .subject import RPM, read_case
@@ -86,7 +86,7 @@ def statics(
         "roller_centrifugal_force": float(bearing.roller_centrifugal_force(shaft)),
     }
     said = f"{np.sum(loads > 0)} of {loads.size} rollers carry {force:g} N, the most loaded one {np.max(loads):.0f} N."
-    figure = drawn(title, lambda ax: jc.show.load_bars(found, ax), 7.0, 3.8)
+    figure = jc.show.drawn(lambda ax: jc.show.load_bars(found, ax), 7.0, 3.8, title)
     data = {f"{name} [{unit}]": np.asarray(x) for name, (x, unit) in columns.items()}
     return Answer(said, tables, [], document, subject, {"figure": (".png", figure), "data": (".csv", data)})
 
@@ -120,7 +120,7 @@ def impact(
     note = "Bar and contact (SI): " + ", ".join(f"{name} {value:g}" for name, value in bar.items())
     said = f"The roller hits the bar at {float(v0):.3g} m/s with up to {values['peak_contact_force']:.4g} N."
     said += " It is still in contact at the end: give a longer --duration." if values["ends_in_contact"] else ""
-    figure = drawn(where, lambda ax: jc.show.impact_forces(found, ax), 7.0, 4.0)
+    figure = jc.show.drawn(lambda ax: jc.show.impact_forces(found, ax), 7.0, 4.0, where)
     files = {"figure": (f"{stem}.png", figure), "data": (f"{stem}.csv", columns)}
     return Answer(said, [table], [note], subject.both(at) | values | {"bar": bar}, subject, files)
 
@@ -163,5 +163,7 @@ def report(
     document["operating"] = [{"low_rpm": x.low_rpm, "high_rpm": x.high_rpm, **verdicts} for x, verdicts in assessed]
     notes = [f"Stages: {', '.join(f'{stage} {seconds:.0f} s' for stage, seconds in found.seconds.items())}"]
     tables += zone_tables(subject, found.sweep, found.zones)
+    if (orbits := found.orbits) is not None:
+        tables.append(jc.show.loss_table(subject.name, orbits.found, orbits.loss, subject.published, subject.beside))
     files = {"report": (".html", html)}
     return Answer(f"{'; '.join(each) or 'The report is written'}.", tables, notes, document, subject, files)

@@ -13,7 +13,7 @@ import jaxcage as jc
 
 from .._errors import InputError
 from . import options as o
-from .answer import Answer, drawn
+from .answer import Answer
 from .subject import RPM, Subject, read_case
 from .values import no_worse_balance, read_bounds, read_each, read_scatter
 
@@ -196,7 +196,7 @@ def sensitivity(
             edges = [s for s in jc.orbits.sensitivities(model, loss.edges).values() if s.trusted]
             slopes = [(s, jc.show.not_fixed(model, s.elasticity)) for s in edges]
             bars = lambda ax: jc.show.elasticity_bars(jc.show.to_be_turned(model, edges), ax)
-            files |= {"figure": (".png", drawn(name, bars, 9.0, 2.2 + 1.2 * len(edges)))} if edges else {}
+            files |= {"figure": (".png", jc.show.drawn(bars, 9.0, 2.2 + 1.2 * len(edges), name))} if edges else {}
     deviation = tolerance / 100 / math.sqrt(3)
     budgets = [d.tolerance_budget(slope, dict.fromkeys(names, deviation)) for slope, names in slopes]
     most, what = max(shares.total, key=shares.total.__getitem__), subject.usual("chaotic speeds", of.replace("_", " "))

@@ -16,7 +16,7 @@ from ..solve import Trajectory
 if TYPE_CHECKING:
     from ..analysis import RollerHistory
     from ..orbits import Branch, Curve
-    from .parameter_axes import Axis
+    from .maps import Axis
 
 
 LARGEST_TABLE = 4_000_000_000
@@ -92,9 +92,10 @@ def roller_columns(history: "RollerHistory") -> dict[str, Shaped[np.ndarray, " s
     return columns
 
 
-def curve_columns(curves: Sequence["Curve"], x: "Axis", y: "Axis") -> dict[str, Shaped[np.ndarray, " points"]]:
-    """Points of curves in two parameters, in the units in which these are shown."""
+def curve_columns(curves: Sequence["Curve"], axis: "Axis") -> dict[str, Shaped[np.ndarray, " points"]]:
+    """Points of curves over speed and a parameter, in the units in which these are shown."""
     joined = lambda rows: np.concatenate([np.asarray(row) for row in rows])
     columns = {"curve": joined(np.full(c.x_value.size, i) for i, c in enumerate(curves, start=1))}
-    columns |= {x.head: x.shown(joined(c.x_value for c in curves)), y.head: y.shown(joined(c.y_value for c in curves))}
+    columns["speed [rpm]"] = joined(c.x_value for c in curves) * 30 / np.pi
+    columns[axis.head] = axis.shown(joined(c.y_value for c in curves))
     return columns | {"genuine": joined(c.genuine for c in curves)}

@@ -9,14 +9,11 @@ import xarray as xr
 from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
-from matplotlib.transforms import offset_copy
-from scipy.optimize import isotonic_regression
 
 from .._errors import ArgumentError
 from ..orbits import Branch, Point
 from ..quantities import component_names, quantity
-from .diagrams import orbit_diagram
-from .speed_axes import label_speed
+from .diagrams import label_speed, orbit_diagram
 from .style import (
     BLACK,
     BLUE,
@@ -53,8 +50,6 @@ MARKS = {
 """Marks of bifurcations in every figure."""
 PERIOD_COLOURS = {1: BLUE, 2: ORANGE, 3: PURPLE, 4: SKY}
 LABEL_SIZE = 7.5
-FARTHEST = 2.0
-"""Largest distance of a label from its place, in widths of a label."""
 REACH = 1.6
 """Largest real and imaginary part of the multipliers that are shown."""
 
@@ -179,35 +174,17 @@ def _mark_points(ax: Axes, points: Sequence[Point], places: Any) -> None:
 
 
 def _write_above(ax: Axes, points: Iterable[Point]) -> None:
-    """Write kind and speed of points in a row above the frame, moved apart, with lines to their places.
-
-    Equal texts, as on branches that share a part, are written once; where there is no room for all near their places,
-    those with the nearest neighbours are left out.
-    """
-    texts = {f"{mark_of(p.kind).short} {p.speed_rpm:.0f}": p for p in points}
-    row = sorted(texts.items(), key=lambda item: item[1].speed_rpm)
+    """Write kind and speed of points above the frame; those without room beside an earlier one are left out."""
     low, high = ax.get_xlim()
-    gap = 1.3 * LABEL_SIZE / (ax.get_window_extent().width * 72 / ax.figure.dpi)
-    at = np.array([(p.speed_rpm - low) / (high - low) for _, p in row])
-    while at.size and np.max(np.abs(move_apart(at, gap) - at)) > FARTHEST * gap:
-        crowded = int(np.argmin(np.diff(at)))
-        at = np.delete(at, crowded)
-        row.pop(crowded)
-    upright = at.size > 1 and float(np.min(np.diff(at))) < 4 * gap
-    above = offset_copy(ax.transAxes, ax.figure, y=16, units="points")  # pyright: ignore[reportArgumentType]
-    line = {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0, "relpos": (0.5, 0.0)}
-    style = {"ha": "center", "va": "bottom", "fontsize": LABEL_SIZE, "annotation_clip": False, "arrowprops": line}
-    for (text, p), where in zip(row, move_apart(at, gap) if upright else at, strict=True):
-        places = {"xycoords": ax.get_xaxis_transform(), "textcoords": above, "rotation": 90 if upright else 0}
-        ax.annotate(text, (p.speed_rpm, 1.0), (where, 1.0), **places, **style, color=mark_of(p.kind).colour)
-
-
-def move_apart(at: np.ndarray, gap: float) -> np.ndarray:
-    """Ascending places at least `gap` apart and from 0 to 1, as near (least squares) to `at` as possible."""
-    steps = gap * np.arange(at.size)
-    if at.size == 0:
-        return at
-    return np.clip(isotonic_regression(at - steps).x, 0.0, max(0.0, 1.0 - steps[-1])) + steps
+    room = 1.3 * LABEL_SIZE / (ax.get_window_extent().width * 72 / ax.figure.dpi) * (high - low)
+    last = -np.inf
+    for p in sorted(points, key=lambda p: float(p.speed_rpm)):
+        if p.speed_rpm - last < room:
+            continue
+        last, mark = p.speed_rpm, mark_of(p.kind)
+        style = {"rotation": 90, "ha": "center", "va": "bottom", "fontsize": LABEL_SIZE, "color": mark.colour}
+        place = {"xycoords": ax.get_xaxis_transform(), "textcoords": "offset points", "annotation_clip": False}
+        ax.annotate(f"{mark.short} {p.speed_rpm:.0f}", (p.speed_rpm, 1.0), (0, 3), **place, **style)
 
 
 def multiplier_circle(branch: Branch, ax: Axes | None = None) -> Axes:
