@@ -133,7 +133,7 @@ def test_init(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     path = tmp_path / "mine.toml"
     assert json.dumps(document(capsys, "init", str(path), "--model", "bearing")) == json.dumps({"file": str(path)})
     assert subject_of(path) == "bearing"
-    assert "takes a cage" in refused(capsys, "impact", str(path), "--speed", "1e4")
+    assert "takes a cage" in refused(capsys, "poincare", str(path), "--speed", "1e4")
 
 
 def test_speeds_of_the_cage_with_a_turning_outer_ring(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):

@@ -1,4 +1,4 @@
-"""Commands about the case itself: its file, its statics, one impact, a report."""
+"""Commands about the case itself: its file, its statics, a report."""
 
 import shlex
 from pathlib import Path
@@ -89,40 +89,6 @@ def statics(
     figure = jc.show.drawn(lambda ax: jc.show.load_bars(found, ax), 7.0, 3.8, title)
     data = {f"{name} [{unit}]": np.asarray(x) for name, (x, unit) in columns.items()}
     return Answer(said, tables, [], document, subject, {"figure": (".png", figure), "data": (".csv", data)})
-
-
-def impact(
-    case: o.Case,
-    *,
-    speed: o.Speed,
-    duration: Annotated[float, o.number("lie between 0 and 1000 ms", lambda x: 0 < x <= 1000, "ms")] = 0.6,
-    show: o.ShowOptions = o.ShowOptions(),
-) -> Answer:
-    """Impact of one roller on a cage bar: history of both forces.
-
-    Args:
-        duration: Length of the history [ms].
-    """
-    subject = read_case(case)
-    subject.require_orbits("impact")
-    at, bearing = subject.speed(speed), subject.model.bearing
-    law = getattr(subject.model.impact, "oscillator", jc.forces.PocketImpact())  # a synchronous impact has none
-    if not float(bearing.pocket_clearance) > 0:
-        raise InputError(f"The pocket clearance of {subject.name} must be above 0 for an impact, but it is 0.")
-    with show.computing(f"impact {subject.name}"):
-        v0 = jc.forces.approach_speed(law.approach_ratio, at, bearing.pocket_clearance)
-        found = jc.forces.impact_history(law, bearing.roller_mass, v0, 1e-3 * duration)
-    where, stem = f"{subject.name}, {subject.at(at)}", f"_{speed:g}rpm"
-    table, values = jc.show.impact_table(f"Impact in {where}", found, float(v0))
-    units = {"time": "s", "contact_force": "N", "bar_force": "N", "roller_position": "m", "bar_position": "m"}
-    columns = {f"{name} [{unit}]": np.asarray(getattr(found, name)) for name, unit in units.items()}
-    bar = {name: float(getattr(law, name)) for name in jc.parameters(law)}
-    note = "Bar and contact (SI): " + ", ".join(f"{name} {value:g}" for name, value in bar.items())
-    said = f"The roller hits the bar at {float(v0):.3g} m/s with up to {values['peak_contact_force']:.4g} N."
-    said += " It is still in contact at the end: give a longer --duration." if values["ends_in_contact"] else ""
-    figure = jc.show.drawn(lambda ax: jc.show.impact_forces(found, ax), 7.0, 4.0, where)
-    files = {"figure": (f"{stem}.png", figure), "data": (f"{stem}.csv", columns)}
-    return Answer(said, [table], [note], subject.both(at) | values | {"bar": bar}, subject, files)
 
 
 def report(

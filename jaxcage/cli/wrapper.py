@@ -33,8 +33,8 @@ OK, FAILED, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
 FUNCTIONS: tuple[Callable[..., Answer], ...] = (
     *(case.init, speed.simulate, speed.sweep, orbit.zones, orbit.bifurcations, orbit.gradient, speed.compare),
-    *(speed.runup, orbit.map_, speed.study, design.design, design.sensitivity, design.unknowns, design.identify),
-    *(speed.poincare, case.statics, case.impact, case.report),
+    *(speed.runup, orbit.map_, speed.study, design.design, design.sensitivity, design.identify),
+    *(speed.poincare, case.statics, case.report),
 )
 COMMANDS = {function.__name__.rstrip("_"): function for function in FUNCTIONS}
 COMPLETION, SHELLS = ("--tyro-print-completion", "--tyro-write-completion"), ("bash", "zsh", "tcsh", "fish")

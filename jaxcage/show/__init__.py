@@ -99,7 +99,6 @@ from .quantity_tables import (
     differences_table as differences_table,
     displacements as displacements,
     head_of as head_of,
-    impact_table as impact_table,
     mean_over_starts as mean_over_starts,
     quantities_table as quantities_table,
     run_tables as run_tables,
@@ -107,7 +106,6 @@ from .quantity_tables import (
 )
 from .report import assess as assess, page as page, verdict_table as verdict_table
 from .run_figures import (
-    impact_forces as impact_forces,
     load_bars as load_bars,
     rollers_of as rollers_of,
     run_figure as run_figure,

@@ -12,7 +12,6 @@ from .._parameters import walk
 from ..analysis import Measures, failed, named_lines, scatter
 from ..bearing import Guidance, LoadDistribution, raceway_surface_speed, static_cage_displacement
 from ..files import configuration
-from ..forces import ImpactHistory
 from .run_figures import Rollers
 from .tables import SHOWN, Column, Table, rows_table, value_table
 
@@ -126,26 +125,6 @@ def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed:
             ("centrifugal force of a roller", float(bearing.roller_centrifugal_force(shaft_speed)), "N"),
         ]
     return value_table(title, rows)
-
-
-def impact_table(title: str, history: ImpactHistory, approach_speed: float) -> tuple[Table, dict[str, Any]]:
-    """Peaks, time in contact and impulse of an impact over its whole history, as a table and for a document.
-
-    A bar that swings back may be hit again.
-    """
-    touching, bar = np.asarray(history.contact_force) > 0, np.asarray(history.bar_force)
-    duration = float(np.sum(touching)) * float(history.time[1] - history.time[0])
-    rows = {
-        "approach_speed": ("approach speed", approach_speed, "m/s"),
-        "peak_contact_force": ("peak contact force", float(np.max(history.contact_force)), "N"),
-        "peak_bar_force": ("peak bar force", float(np.max(bar)), "N"),
-        "lowest_bar_force": ("lowest bar force", float(np.min(bar)), "N"),
-        "contact_duration": ("time in contact", duration, "s"),
-        "contacts": ("contacts", int(np.sum(touching[1:] & ~touching[:-1])), "1"),
-        "impulse": ("impulse of the contact force", float(history.impulse), "N s"),
-        "ends_in_contact": ("still in contact at the end", bool(touching[-1]), "1"),
-    }
-    return value_table(title, rows.values()), {key: value for key, (_, value, _) in rows.items()}
 
 
 def differences(models: Sequence[Any]) -> list[dict[str, Any]]:

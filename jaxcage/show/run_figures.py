@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from itertools import cycle
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -23,7 +23,6 @@ from ..analysis import (
     roller_history,
 )
 from ..bearing import LoadDistribution
-from ..forces import ImpactHistory
 from ..quantities import component_names, quantity
 from ..solve import Trajectory
 from .style import (
@@ -55,15 +54,6 @@ MM = 1e3
 LONGEST_ARROW = 0.14
 """Length of the arrow of the largest pocket force of a run, relative to the outside diameter."""
 SPECTRA = {"cage_place": "Cage, vertical / clearance", "pocket_force": "Pockets, vertical [N]"}
-
-
-class Drawn(Protocol):
-    """What the drawing of a bearing takes from a model."""
-
-    bearing: Any
-    outer_radius: Any
-    inner_radius: Any
-    land_radius: Any
 
 
 @dataclasses.dataclass(frozen=True)
@@ -191,7 +181,7 @@ def _wide_limits(values: np.ndarray) -> tuple[float, float]:
     return min(low, centre - least), max(high, centre + least)
 
 
-def bearing_drawing(model: Drawn, run: Trajectory, history: RollerHistory, sample: int, ax: Axes | None = None) -> Axes:
+def bearing_drawing(model: Any, run: Trajectory, history: RollerHistory, sample: int, ax: Axes | None = None) -> Axes:
     """Rings, rollers and cage at one sample, to scale; arrows are the forces of the rollers on the bars of the cage.
 
     The displacement of the cage and its clearances, a few tenths of a millimetre, are not enlarged. The longest arrow
@@ -229,7 +219,7 @@ def bearing_drawing(model: Drawn, run: Trajectory, history: RollerHistory, sampl
     return ax
 
 
-def _bars(model: Drawn, run: Trajectory, sample: int) -> list[np.ndarray]:
+def _bars(model: Any, run: Trajectory, sample: int) -> list[np.ndarray]:
     """Corners of the bars between the pockets [mm], in the height that guiding surface and roller centres leave."""
     n, free = model.bearing.n_rollers, float(model.bearing.roller_diameter + model.bearing.pocket_clearance) / 2
     pitch, land = float(model.outer_radius - model.bearing.roller_diameter / 2), float(model.land_radius)
@@ -304,7 +294,7 @@ def force_over_time(history: RollerHistory, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def bearing_figure(model: Drawn, run: Trajectory, found: Rollers, title: str = "") -> Figure:
+def bearing_figure(model: Any, run: Trajectory, found: Rollers, title: str = "") -> Figure:
     """The bearing at its largest pocket force, the path of the cage, slips and forces around it, spectra if any."""
     history, rows = found.history, 4 if found.spectra else 3
     figure = new_figure(12.0, 11.0 if found.spectra else 8.0)
@@ -335,19 +325,6 @@ def load_bars(distribution: LoadDistribution, ax: Axes | None = None) -> Axes:
     ax.set(xlim=(-190, 190), xticks=range(-180, 181, 45))
     ax.set(xlabel="Angle from the load [°]", ylabel="Roller load on the inner raceway [N]")
     ax.legend(frameon=False, fontsize=9)
-    return ax
-
-
-def impact_forces(history: ImpactHistory, ax: Axes | None = None) -> Axes:
-    """Contact force between roller and bar, which is never negative, and force in the swinging bar over time."""
-    ax = axes_or_new(ax, 7.0, 4.0)
-    time = np.asarray(history.time) * quantity("time").factor
-    ax.axhline(0, color=GREY, linewidth=0.8)
-    for name, colour in (("contact_force", BLUE), ("bar_force", VERMILION)):
-        label = f"{quantity(name).text} {quantity(name).symbol}"
-        ax.plot(time, np.asarray(getattr(history, name)), color=colour, linewidth=1.4, label=label)
-    ax.set(xlabel=quantity("time").label, ylabel=quantity("force").label, xlim=(time[0], time[-1]))
-    ax.legend(frameon=False, fontsize=9, loc="upper right")
     return ax
 
 
