@@ -189,8 +189,6 @@ def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_pat
     whole = document(capsys, *asked)
     assert (whole["stored"], whole["stored_before"]) == (24, 12)
     assert "differs in discard" in refused(capsys, *asked, "--discard", "20")
-    (tmp_path / "mine").mkdir()
-    assert "--store must be a new folder" in refused(capsys, *asked, "--store", "mine")
     stored = jc.open_study(whole["store"])
     model, speeds = jc.replace(jc.case("1a"), guidance_gap=0.5e-3), jc.rpm(9000, 12000, 6)
     length = dict(discard=10, revolutions=20, blocks=20, keep=16, method=jc.method("rk4", steps=128))

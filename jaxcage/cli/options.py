@@ -3,10 +3,8 @@
 import contextlib
 import dataclasses
 import math
-import os
 import re
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
@@ -101,13 +99,6 @@ def text(
         return read(given)
 
     return _option(metavar, checked)
-
-
-def is_within(path: str) -> bool:
-    """True if a path leads to a place within the folder that it starts from, by names that a disk takes."""
-    parts = Path(path).parts
-    short = all(len(os.fsencode(part)) <= 200 for part in parts)  # temporary names are longer
-    return bool(parts) and short and not Path(path).is_absolute() and ".." not in parts
 
 
 _SPEED = number("be a speed above 0 rpm", lambda x: x > 0, "rpm")

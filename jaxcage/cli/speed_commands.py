@@ -327,7 +327,6 @@ def study(
     seed: o.Seed = 0,
     starts: o.OptionalCount = None,
     exponents: o.OptionalCount = None,
-    store: Annotated[str | None, o.text("name a folder within --out", o.is_within)] = None,
     chunk: o.OptionalCount = None,
     shard: o.Shard = None,
     run: o.RunOptions = o.RunOptions(),
@@ -341,12 +340,11 @@ def study(
         sample: Number of samples, best a power of 2.
         starts: Initial states at each point; all of the model's own if left out.
         exponents: Number of Lyapunov exponents.
-        store: Name of the store within the output folder.
         chunk: Lanes computed and stored together.
         shard: Part of the work, e.g. 2/4: every fourth chunk from the second on. All parts write to the same store.
     """
     subject = read_case(case)
-    path = Path(show.out) / (store or f"study_{subject.name}.zarr")
+    path = Path(show.out) / f"study_{subject.name}.zarr"
     given, done = read_vary(vary, subject), []
     if np.prod([max(sample, 1.0), *(float(x.size) for x in given.values() if isinstance(x, np.ndarray))]) > MOST_POINTS:
         raise InputError(f"Options --vary and --sample must make at most {MOST_POINTS} points to run lanes at.")

@@ -146,12 +146,11 @@ def _check_corners(vary: dict[str, Any], subject: Subject) -> None:
     """Check the smallest and largest values of all that is varied, and that they go together."""
     ends = {name: (how.min(), how.max()) if isinstance(how, np.ndarray) else how.bounds for name, how in vary.items()}
     ends.pop(SPEED, None)
-    for values in itertools.islice(itertools.product(*(sorted(set(pair)) for pair in ends.values())), MOST_CORNERS):
-        corner = dict(zip(ends, map(float, values), strict=True))
-        oil = {name: corner.pop(name) for name in [OIL] if name in corner}
+    for values in itertools.islice(itertools.product(*ends.values()), MOST_CORNERS):
         try:
+            corner = {name: float(value) for name, value in zip(ends, values, strict=True)}
+            oil = {OIL: corner.pop(OIL)} if OIL in corner else {}
             jc.files.check_together(jc.replace(jc.lanes.with_values(subject.model, oil), **corner))
-        except ArgumentError as error:
-            raise InputError(error.about("Option --vary", str)) from error
         except ValueError as error:
-            raise InputError(f"Option --vary: {error}") from error
+            said = error.about("Option --vary", str) if isinstance(error, ArgumentError) else f"Option --vary: {error}"
+            raise InputError(said) from error

@@ -40,13 +40,8 @@ COMMANDS = {function.__name__.rstrip("_"): function for function in FUNCTIONS}
 COMPLETION, SHELLS = ("--tyro-print-completion", "--tyro-write-completion"), ("bash", "zsh", "tcsh", "fish")
 """Options that tyro takes by itself, and the values that it asserts."""
 CALLED = {"directions": "by", "lanes": "chunk", "samples": "sample", "settle": "discard", "confirm": "no_confirm"}
-CALLED |= {
-    "method": "solver",
-    "centrifugal_force": "shaft_speed",
-    "blocks": "revolutions",
-    "x": "points",
-    "y": "points",
-}
+CALLED |= {"method": "solver", "centrifugal_force": "shaft_speed", "blocks": "revolutions", "store": "out"}
+CALLED |= {"x": "points", "y": "points"}
 """Argument of the library -> option that it comes from, where no option has its name."""
 
 

@@ -18,26 +18,8 @@ from matplotlib.transforms import offset_copy
 from ..analysis import CHAOS_THRESHOLD, Stretch, Zone, Zones, failed
 from ..bearing import PublishedCase
 from ..quantities import quantity
+from . import style
 from .quantity_tables import SHARES, head_of, mean_over_starts
-from .style import (
-    BLACK,
-    BLUE,
-    GREY,
-    KIND_COLOURS,
-    LINE_COLOURS,
-    MOTION_COLOURS,
-    PURPLE,
-    SKY,
-    VERMILION,
-    ZONE,
-    axes_or_new,
-    dots,
-    dress,
-    entitled,
-    legend_below,
-    new_figure,
-    padded_limits,
-)
 from .tables import SHOWN, factor
 from .zone_tables import published_zones, zone_span
 
@@ -92,8 +74,8 @@ def _add_below(ax: Axes, ratio: float) -> None:
     )
     shaft.set_xlabel(SHAFT)
     shaft.xaxis.set_major_formatter(StrMethodFormatter("{x:.0f}"))
-    shaft.tick_params(color=GREY, labelsize=9)
-    shaft.spines["bottom"].set(color=GREY, linewidth=0.8)
+    shaft.tick_params(color=style.GREY, labelsize=9)
+    shaft.spines["bottom"].set(color=style.GREY, linewidth=0.8)
     legend = ax.get_legend()
     if legend is not None and legend.get_bbox_to_anchor().y1 < ax.get_window_extent().y0:  # it was beneath already
         legend.set_loc("upper center")
@@ -104,13 +86,11 @@ def shade_zones(ax: Axes, zones: Zones | Sequence[Stretch]) -> Axes:
     """Shade the chaotic zones, an open one to the end of the axis; or stretches of speed by the motion of the cage."""
     low, high = ax.get_xlim()
     if isinstance(zones, Zones):
-        shaded = [("chaotic zone", ZONE, 1.0, span) for span in (zone_span(z, low, high) for z in zones.zones)]
+        shaded = [("chaotic zone", style.ZONE, 1.0, span) for span in (zone_span(z, low, high) for z in zones.zones)]
     else:
-        shaded = [
-            (" or ".join(s.labels).replace("_", " "), MOTION_COLOURS.get("".join(s.labels), GREY), 0.1, span)
-            for s in zones
-            for span in [(s.low_rpm, s.high_rpm)]
-        ]
+        colour_of = lambda labels: style.MOTION_COLOURS.get("".join(labels), style.GREY)
+        motion = lambda labels: " or ".join(labels).replace("_", " ")
+        shaded = [(motion(s.labels), colour_of(s.labels), 0.1, (s.low_rpm, s.high_rpm)) for s in zones]
     drawn: set[str] = set()
     for label, colour, alpha, (first, last) in shaded:
         name = f"_{label}" if label in drawn else label
@@ -139,28 +119,25 @@ def mark_published(ax: Axes, published: PublishedCase, text: bool = True) -> Axe
     above = ax.get_xaxis_transform()
     for i, (name, rpm) in enumerate(inside.items()):
         label = "published edge" if i == 0 else None
-        ax.axvline(rpm, color=BLACK, linewidth=0.9, linestyle=(0, (1, 2)), label=label)
+        ax.axvline(rpm, color=style.BLACK, linewidth=0.9, linestyle=(0, (1, 2)), label=label)
         if text:
             marker = "<" if name.endswith("exit") else ">"
-            ax.plot(rpm, 1.0, marker, color=BLACK, markersize=5, transform=above, clip_on=False)
-            style = {"textcoords": "offset points", "ha": "center", "va": "bottom", "fontsize": 8}
-            ax.annotate(f"{rpm:.0f}", (rpm, 1.0), (0, 5), xycoords=above, **style)
+            ax.plot(rpm, 1.0, marker, color=style.BLACK, markersize=5, transform=above, clip_on=False)
+            look = {"textcoords": "offset points", "ha": "center", "va": "bottom", "fontsize": 8}
+            ax.annotate(f"{rpm:.0f}", (rpm, 1.0), (0, 5), xycoords=above, **look)
     return ax
 
 
 def mark_operating(ax: Axes, spans: Sequence[Span]) -> Axes:
-    """Mark operating speeds [rpm]: a line for a speed, a light band for a range, both with a bar at the foot."""
+    """Mark operating speeds [rpm]: a line for a speed, a light band for a range."""
     low, high = ax.get_xlim()
     for i, (first, last) in enumerate(span for span in spans if span[1] >= low and span[0] <= high):
         label = "operating speed" if i == 0 else "_operating speed"
         for edge in {first, last}:
-            ax.axvline(edge, color=PURPLE, linewidth=1.1, linestyle=(0, (6, 2)), zorder=2, label=label)
+            ax.axvline(edge, color=style.PURPLE, linewidth=1.1, linestyle=(0, (6, 2)), zorder=2, label=label)
             label = "_operating speed"
         if last > first:
-            ax.axvspan(first, last, color=PURPLE, alpha=0.12, linewidth=0, zorder=0.5)
-        middle, half = (first + last) / 2, max(last - first, 0.004 * (high - low)) / 2
-        ends = np.clip([middle - half, middle + half], low, high)
-        ax.plot(ends, [0, 0], color=PURPLE, linewidth=5, transform=ax.get_xaxis_transform(), clip_on=False)
+            ax.axvspan(first, last, color=style.PURPLE, alpha=0.12, linewidth=0, zorder=0.5)
     ax.set_xlim(low, high)
     return ax
 
@@ -178,22 +155,22 @@ def zone_strip(
     **Arguments:** synchronous-loss and chaotic zones; ends of the sweep, operating speeds and ranges [rpm]; the
     published case; axes. An open zone reaches to the end of the axis.
     """
-    rows: list[tuple[str, str, Sequence[Span]]] = [("operating", PURPLE, operating)] if operating else []
-    for name, colour, zones in (("synchronous loss", BLUE, loss), ("chaotic", VERMILION, chaotic)):
+    rows: list[tuple[str, str, Sequence[Span]]] = [("operating", style.PURPLE, operating)] if operating else []
+    for name, colour, zones in (("synchronous loss", style.BLUE, loss), ("chaotic", style.VERMILION, chaotic)):
         rows.append((name, colour, [zone_span(zone, *limits_rpm) for zone in zones]))
     if published is not None:
         ends = ((low, limits_rpm[1] if high is None else high) for low, high in published_zones(published))
-        rows.append(("published", GREY, [(low, high) for low, high in ends if high > low]))
-    ax = axes_or_new(ax, 9.5, 0.9 + 0.42 * len(rows))
+        rows.append(("published", style.GREY, [(low, high) for low, high in ends if high > low]))
+    ax = style.axes_or_new(ax, 9.5, 0.9 + 0.42 * len(rows))
     low, high = limits_rpm
     least = 0.003 * (high - low)  # a single speed must be visible
     for i, (_, colour, spans) in enumerate(rows):
-        ax.barh(i, high - low, left=low, height=0.62, color=GREY, alpha=0.13, linewidth=0)
+        ax.barh(i, high - low, left=low, height=0.62, color=style.GREY, alpha=0.13, linewidth=0)
         for first, last in spans:
             width = max(last - first, least)
             ax.barh(i, width, left=(first + last - width) / 2, height=0.62, color=colour, linewidth=0)
     for edge in {edge for span in operating for edge in span}:
-        ax.axvline(edge, color=PURPLE, linewidth=1.0, linestyle=(0, (5, 2)), zorder=3)
+        ax.axvline(edge, color=style.PURPLE, linewidth=1.0, linestyle=(0, (5, 2)), zorder=3)
     ax.set(xlim=limits_rpm, ylim=(len(rows) - 0.5, -0.5))
     ax.set_yticks(range(len(rows)), [name for name, _, _ in rows])
     ax.tick_params(axis="y", length=0)
@@ -205,7 +182,7 @@ def zone_strip(
 SWEPT = ("cage_slip", "pocket_force_mean_sum_N", "pocket_force_max_N", "friction_power_W", "synchronous_force_x_N")
 COMPARED = ("cage_slip", "friction_power_W", "pocket_impulse_N_s", "land_impulse_N_s", "pocket_wear_mm3_per_h")
 """Quantities of a whole bearing in the figure of a sweep and in that of several bearings."""
-BESIDE_COLOURS = (BLUE, VERMILION, *LINE_COLOURS[1:4])
+BESIDE_COLOURS = (style.BLUE, style.VERMILION, *style.LINE_COLOURS[1:4])
 """Colours of designs beside each other."""
 
 
@@ -232,7 +209,7 @@ def orbit_diagram(
     **Arguments:** sweep; component of the state (1: vertical displacement of a cage); axes; range of speed for a zoomed
     diagram, whose vertical limits then fit the states in it.
     """
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     named = quantity(str(sweep["component"].values[component]))
     low, high = speed_limits(sweep) if limits_rpm is None else limits_rpm
     inside = sweep.isel(speed=(sweep["rpm"].values >= low) & (sweep["rpm"].values <= high))
@@ -240,16 +217,16 @@ def orbit_diagram(
     speeds, labels = np.broadcast_to(rpm[:, None, None], points.shape), inside["label"].values.astype(str)
     kind = np.where(np.char.startswith(labels, "periodic"), "periodic", labels)  # all periods together
     size = 1.8 if rpm.size > 150 else 2.5
-    for label, colour in KIND_COLOURS.items():
+    for label, colour in style.KIND_COLOURS.items():
         lanes = kind == label
         if np.any(lanes):
-            style = dots(colour, size) | {"alpha": 0.5, "rasterized": True}
-            ax.plot(speeds[lanes].ravel(), points[lanes].ravel(), **style, label=label)
+            look = style.dots(colour, size) | {"alpha": 0.5, "rasterized": True}
+            ax.plot(speeds[lanes].ravel(), points[lanes].ravel(), **look, label=label)
     lost = rpm[np.any(failed(inside), axis=1)]
     if lost.size:
-        foot = {"color": BLACK, "markersize": 4, "transform": ax.get_xaxis_transform()}
+        foot = {"color": style.BLACK, "markersize": 4, "transform": ax.get_xaxis_transform()}
         ax.plot(lost, np.full(lost.size, 0.015), "x", **foot, label="failed")
-    ax.set(xlim=(low, high), ylim=padded_limits(points), ylabel=named.label)
+    ax.set(xlim=(low, high), ylim=style.padded_limits(points), ylabel=named.label)
     return label_speed(ax, sweep)
 
 
@@ -259,21 +236,21 @@ def exponent_strip(sweep: xr.Dataset, ax: Axes | None = None) -> Axes:
 
     The lower limit is cut where strongly attracting orbits would hide the range around zero.
     """
-    ax = axes_or_new(ax, height=2.5)
+    ax = style.axes_or_new(ax, height=2.5)
     rpm = sweep["rpm"].values
     largest, error = sweep["exponents"].values[..., 0], sweep["standard_error"].values[..., 0]
     finished = np.where(failed(sweep), -np.inf, largest)
     lane = (np.arange(rpm.size), np.argmax(finished, axis=1))
     top = np.where(np.isfinite(finished[lane]), finished[lane], np.nan)
     band = 2 * error[lane]
-    ax.axhline(0, color=BLACK, linewidth=0.8)
+    ax.axhline(0, color=style.BLACK, linewidth=0.8)
     if "strobe" in sweep:
-        threshold = {"color": VERMILION, "linewidth": 0.8, "linestyle": "--"}
+        threshold = {"color": style.VERMILION, "linewidth": 0.8, "linestyle": "--"}
         ax.axhline(CHAOS_THRESHOLD, **threshold, label=f"chaotic above {CHAOS_THRESHOLD}")
-    ax.plot(np.repeat(rpm, largest.shape[1]), largest.ravel(), **dots(GREY, 3), label="each start")
-    shade = {"color": SKY, "alpha": 0.5, "linewidth": 0, "label": "±2 standard errors"}
+    ax.plot(np.repeat(rpm, largest.shape[1]), largest.ravel(), **style.dots(style.GREY, 3), label="each start")
+    shade = {"color": style.SKY, "alpha": 0.5, "linewidth": 0, "label": "±2 standard errors"}
     ax.fill_between(rpm, top - band, top + band, **shade)
-    ax.plot(rpm, top, color=BLUE, linewidth=0.9, label="largest of the starts")
+    ax.plot(rpm, top, color=style.BLUE, linewidth=0.9, label="largest of the starts")
     ax.set(xlim=speed_limits(sweep), ylim=_exponent_limits(largest, top, band))
     ax.set_ylabel("largest exponent\nper revolution " + quantity("largest_exponent").symbol)
     return label_speed(ax, sweep)
@@ -312,7 +289,7 @@ def sweep_figure(
         draw.append(lambda ax: exponent_strip(sweep, ax))
     columns = 2 if len(draw) > 3 else 1
     rows = math.ceil(len(draw) / columns)
-    figure = new_figure(9.5 if columns == 1 else 11.5, 1.6 + 2.4 * rows)
+    figure = style.new_figure(9.5 if columns == 1 else 11.5, 1.6 + 2.4 * rows)
     heights = (2.6, *[1.0] * (rows - 1)) if "strobe" in sweep else [1.0] * rows
     cells = figure.subplots(rows, columns, sharex=True, squeeze=False, height_ratios=heights)
     axes = [panel(ax) for panel, ax in zip(draw, cells.ravel(), strict=False)]
@@ -325,7 +302,7 @@ def sweep_figure(
             shade_zones(ax, zones)
         if published is not None:
             mark_published(ax, published, text=ax is axes[0])
-    legend_below(figure, *axes)
+    style.legend_below(figure, *axes)
     axes[0].set_title(title, loc="left", fontsize=11, pad=18 if published is not None else 8)
     return add_shaft_axes(figure, sweep)
 
@@ -337,7 +314,7 @@ def sweeps_beside(names: Sequence[str], sweeps: Sequence[xr.Dataset], zones: Seq
     """
     if any("strobe" not in sweep for sweep in sweeps):
         return quantities_beside(names, sweeps, [*reported(sweeps[0], COMPARED), "exponent"])
-    figure = new_figure(12.0, 6.4)
+    figure = style.new_figure(12.0, 6.4)
     cells = figure.subplots(2, len(sweeps), sharex="col", sharey="row", squeeze=False, height_ratios=(2.0, 1.0))
     draw_beside(cells, names, sweeps, zones)
     return figure
@@ -365,7 +342,7 @@ def draw_beside(
             ax.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
     for ax, sweep in zip(cells[1], sweeps, strict=True):
         add_shaft_axes(figure, sweep, [ax])
-    legend_below(figure, *cells.ravel())
+    style.legend_below(figure, *cells.ravel())
 
 
 def _lines(ax: Axes, name: str, sweeps: dict[str, xr.Dataset]) -> Axes:
@@ -373,8 +350,8 @@ def _lines(ax: Axes, name: str, sweeps: dict[str, xr.Dataset]) -> Axes:
     for (text, sweep), colour in zip(sweeps.items(), cycle(BESIDE_COLOURS), strict=False):
         label, times = labelled(sweep["exponents" if name == "exponent" else name])
         mean, error = (times * x for x in mean_over_starts(sweep, name))
-        style: Any = dict(color=colour, linewidth=1.1, marker=".", elinewidth=0.8, label=text)
-        dress(ax).errorbar(sweep["rpm"].values, mean, np.nan_to_num(error), **style)
+        look: Any = dict(color=colour, linewidth=1.1, marker=".", elinewidth=0.8, label=text)
+        style.dress(ax).errorbar(sweep["rpm"].values, mean, np.nan_to_num(error), **look)
         ax.set_ylabel(label)
     return ax
 
@@ -390,15 +367,15 @@ def quantities_beside(
     differ are shaded."""
     columns = 2 if len(quantities) > 3 else 1
     rows = math.ceil(len(quantities) / columns)
-    figure = new_figure(9.5 if columns == 1 else 11.5, 1.2 + 2.4 * rows)
+    figure = style.new_figure(9.5 if columns == 1 else 11.5, 1.2 + 2.4 * rows)
     cells, rpm = figure.subplots(rows, columns, sharex=True, squeeze=False), sweeps[0]["rpm"].values
     half = 0.5 * float(rpm[1] - rpm[0]) if rpm.size > 1 else 0.0
     for ax, name in zip(cells.ravel(), quantities, strict=False):
         _lines(ax, name, dict(zip(names, sweeps, strict=True)))
         for i, (low, high) in enumerate(differ):
             label = "_differs" if i else "differs: hysteresis"
-            ax.axvspan(low - half, high + half, color=ZONE, linewidth=0, zorder=0, label=label)
+            ax.axvspan(low - half, high + half, color=style.ZONE, linewidth=0, zorder=0, label=label)
     for ax in cells[-1]:
         label_speed(ax, sweeps[0])
-    legend_below(figure, cells[0, 0])
-    return add_shaft_axes(entitled(figure, title), sweeps[0])
+    style.legend_below(figure, cells[0, 0])
+    return add_shaft_axes(style.entitled(figure, title), sweeps[0])

@@ -18,21 +18,9 @@ from ..analysis import failed
 from ..orbits import Curve, Point, curve
 from ..quantities import quantity
 from ..solve import AbstractMethod
+from . import style
 from .diagrams import label_speed, labelled, reported
 from .orbit_figures import chosen_pieces, mark_of
-from .style import (
-    GREY,
-    KIND_COLOURS,
-    MOTION_COLOURS,
-    axes_or_new,
-    dress,
-    entitled,
-    halo,
-    legend_above,
-    new_figure,
-    padded_limits,
-    readable,
-)
 from .tables import SHOWN, Column, Table, factor, rows_table
 
 
@@ -144,23 +132,23 @@ def stability_map(axis: Axis, curves: Sequence[Curve], ax: Axes | None = None, f
     """
     if other := [f"{c.y} over {c.x}" for c in curves if (c.x, c.y) != (SPEED, axis.name)]:
         raise ArgumentError("curves", said=f"must be of {axis.name} over speed, but {', '.join(other)} was given.")
-    ax = axes_or_new(ax, 9.0, 5.0)
+    ax = style.axes_or_new(ax, 9.0, 5.0)
     lines = [(RPM * np.asarray(c.x_value), axis.shown(c.y_value)) for c in curves]
     for c, (x, y) in zip(curves, lines, strict=True):
         _draw_curve(ax, c, x, y)
     if curves:
-        legend_above(ax)
+        style.legend_above(ax)
     if found is None:
         across, upward = (np.concatenate([line[i] for line in lines] or [np.zeros(0)]) for i in (0, 1))
-        ax.set(xlim=padded_limits(across), ylim=padded_limits(upward))
+        ax.set(xlim=style.padded_limits(across), ylim=style.padded_limits(upward))
     else:
         ax.grid(False)
         x, y = _cells(found, axis)
-        style = {"cmap": "RdBu_r", "vmin": -STEEPEST, "vmax": STEEPEST, "rasterized": True, "alpha": 0.85, "zorder": 0}
-        mesh = ax.pcolormesh(x, y, np.ma.masked_invalid(top_exponent(found)).T, **style)
+        look = {"cmap": "RdBu_r", "vmin": -STEEPEST, "vmax": STEEPEST, "rasterized": True, "alpha": 0.85, "zorder": 0}
+        mesh = ax.pcolormesh(x, y, np.ma.masked_invalid(top_exponent(found)).T, **look)
         ax.figure.colorbar(mesh, ax=ax, label=quantity("largest_exponent").label, pad=0.01, extend="both")
         ax.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
-    ax.set_ylabel(readable(axis.head).capitalize())
+    ax.set_ylabel(style.readable(axis.head).capitalize())
     return label_speed(ax, axis.speed_text)
 
 
@@ -171,8 +159,13 @@ def _draw_curve(ax: Axes, curve: Curve, x: np.ndarray, y: np.ndarray) -> None:
     for label, chosen, width, dash in (("neutral saddles", ~genuine, 1.6, ":"), (curve.kind, genuine, 2.0, "-")):
         if np.any(chosen):
             name = f"_{label}" if label in drawn else label
-            style = {"linestyle": dash, "color": mark_of(curve.kind).colour, "path_effects": halo(3.6), "zorder": 3}
-            ax.plot(*chosen_pieces(x, y, chosen), linewidth=width, **style, label=name)
+            look = {
+                "linestyle": dash,
+                "color": mark_of(curve.kind).colour,
+                "path_effects": style.halo(3.6),
+                "zorder": 3,
+            }
+            ax.plot(*chosen_pieces(x, y, chosen), linewidth=width, **look, label=name)
 
 
 def _cells(found: xr.Dataset, axis: Axis) -> tuple[np.ndarray, np.ndarray]:
@@ -190,12 +183,12 @@ def map_figure(axis: Axis, curves: Sequence[Curve], found: xr.Dataset | None, ti
     **Arguments:** the parameter; curves; a map of labels, or None for the curves alone; title.
     """
     if found is None:
-        figure = new_figure(10.0, 6.0)
+        figure = style.new_figure(10.0, 6.0)
         stability_map(axis, curves, figure.subplots())
-        return entitled(figure, title)
+        return style.entitled(figure, title)
     names, (x, y) = reported(found, MAPPED), _cells(found, axis)
     rows = (len(names) + 3) // 2
-    figure = new_figure(11.5, 1.0 + 3.8 * rows)
+    figure = style.new_figure(11.5, 1.0 + 3.8 * rows)
     cells = figure.subplots(rows, 2, squeeze=False).ravel()
     stability_map(axis, curves, cells[0], found).set_title("Largest exponent", fontsize=10, loc="left", pad=20)
     _colour_labels(cells[1], x, y, found["label"].values.astype(str))
@@ -203,24 +196,26 @@ def map_figure(axis: Axis, curves: Sequence[Curve], found: xr.Dataset | None, ti
         label, times = labelled(found[name])
         z = times * found[name].mean("start", skipna=True).values
         ratio = np.nanmin(z) > 0 and np.nanmax(z) > 20 * np.nanmin(z)
-        drawn = dress(ax).pcolormesh(x, y, z.T, cmap="viridis", norm=LogNorm() if ratio else None)
+        drawn = style.dress(ax).pcolormesh(x, y, z.T, cmap="viridis", norm=LogNorm() if ratio else None)
         figure.colorbar(drawn, ax=ax)
         ax.set_title(label, fontsize=10, loc="left")
     for ax in cells[1 : 2 + len(names)]:
-        ax.set_ylabel(readable(axis.head).capitalize())
+        ax.set_ylabel(style.readable(axis.head).capitalize())
         label_speed(ax, axis.speed_text).grid(False)
     for ax in cells[2 + len(names) :]:
         ax.set_axis_off()
-    return entitled(figure, title)
+    return style.entitled(figure, title)
 
 
 def _colour_labels(ax: Axes, x: np.ndarray, y: np.ndarray, labels: np.ndarray) -> None:
     """Colours of the labels, grey where initial states differ or lanes failed."""
     kinds = np.where(np.char.startswith(labels, "periodic"), "periodic", labels)
-    known = {**KIND_COLOURS, **MOTION_COLOURS}
+    known = {**style.KIND_COLOURS, **style.MOTION_COLOURS}
     pale: Any = lambda colour: tuple(0.45 + 0.55 * part for part in to_rgb(colour))
-    colour = lambda lanes: pale(known.get(lanes[0], GREY) if len(set(lanes)) == 1 else GREY)
-    dress(ax).pcolormesh(x, y, np.array([[colour(lanes.tolist()) for lanes in row] for row in kinds.swapaxes(0, 1)]))
+    colour = lambda lanes: pale(known.get(lanes[0], style.GREY) if len(set(lanes)) == 1 else style.GREY)
+    style.dress(ax).pcolormesh(
+        x, y, np.array([[colour(lanes.tolist()) for lanes in row] for row in kinds.swapaxes(0, 1)])
+    )
     ax.set_title("Label (grey: the start decides, or failed)", fontsize=10, loc="left")
     met = [name for name in known if np.any(kinds == name)]
     patches: list[Any] = [Patch(color=pale(known[name]), label=name.replace("_", " ")) for name in met]

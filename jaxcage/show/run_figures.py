@@ -25,31 +25,11 @@ from ..analysis import (
 from ..bearing import LoadDistribution
 from ..quantities import component_names, quantity
 from ..solve import Trajectory
-from .style import (
-    BLACK,
-    BLUE,
-    FORCE_COLOURS,
-    GREEN,
-    GREY,
-    GRID,
-    LINE_COLOURS,
-    ORANGE,
-    OWN_COLOURS,
-    PURPLE,
-    SKY,
-    VERMILION,
-    axes_or_new,
-    dots,
-    entitled,
-    legend_above,
-    legend_beside,
-    new_figure,
-    padded_limits,
-)
+from . import style
 
 
 Forces = Mapping[str, Float[np.ndarray, "samples 2"]]
-START_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY)
+START_COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.SKY)
 MM = 1e3
 LONGEST_ARROW = 0.14
 """Length of the arrow of the largest pocket force of a run, relative to the outside diameter."""
@@ -79,16 +59,16 @@ def rollers_of(model: Any, run: Trajectory) -> Rollers | None:
 def time_history(trajectory: Trajectory, ax: Axes | None = None) -> Axes:
     """Horizontal and vertical displacement of the cage over time."""
     place = [(quantity(name), i) for i, name in enumerate(("x_C", "y_C"))]
-    lines = {q.symbol: (q.factor * trajectory.state[:, i], (VERMILION, BLUE)[i], "-") for q, i in place}
+    lines = {q.symbol: (q.factor * trajectory.state[:, i], (style.VERMILION, style.BLUE)[i], "-") for q, i in place}
     return _over_time(trajectory, lines, f"Displacement [{quantity('x_C').shown_unit}]", ax)
 
 
 def force_history(trajectory: Trajectory, forces: Forces, axis: int = 1, ax: Axes | None = None) -> Axes:
     """Each force on the cage over time, its horizontal (`axis` 0) or vertical (1) component."""
-    own = cycle(OWN_COLOURS)
+    own = cycle(style.OWN_COLOURS)
     lines: dict[str, tuple[np.ndarray, str, str]] = {}
     for name, force in forces.items():
-        colour, dash = (FORCE_COLOURS[name], "-") if name in FORCE_COLOURS else (next(own), "--")
+        colour, dash = (style.FORCE_COLOURS[name], "-") if name in style.FORCE_COLOURS else (next(own), "--")
         lines[name] = force[:, axis], colour, dash
     return _over_time(trajectory, lines, f"{('Horizontal', 'Vertical')[axis]} force [N]", ax)
 
@@ -96,13 +76,13 @@ def force_history(trajectory: Trajectory, forces: Forces, axis: int = 1, ax: Axe
 def _over_time(
     trajectory: Trajectory, lines: Mapping[str, tuple[np.ndarray, str, str]], ylabel: str, ax: Axes | None
 ) -> Axes:
-    ax = axes_or_new(ax, height=3.0)
+    ax = style.axes_or_new(ax, height=3.0)
     time = trajectory.time * quantity("time").factor
     for label, (values, colour, dash) in lines.items():
         ax.plot(time, values, color=colour, linestyle=dash, linewidth=0.9, label=label)
     ends = (float(time[0]), float(time[-1]) if time.size > 1 else float(time[0]) + 1.0)
     ax.set(xlabel=quantity("time").label, ylabel=ylabel, xlim=ends)
-    legend_beside(ax)
+    style.legend_beside(ax)
     return ax
 
 
@@ -111,7 +91,7 @@ def orbit(trajectory: Trajectory, clearance: Float[np.ndarray, ""] | float, ax: 
 
     **Arguments:** trajectory; radial clearance [m]; axes.
     """
-    ax = axes_or_new(ax, 5.0, 5.0)
+    ax = style.axes_or_new(ax, 5.0, 5.0)
     path = trajectory.state[:, :2]
     if trajectory.state.shape[1] == 8:
         path = path - trajectory.state[:, 2:4]
@@ -123,9 +103,9 @@ def orbit(trajectory: Trajectory, clearance: Float[np.ndarray, ""] | float, ax: 
 
 def path_in_circle(ax: Axes, path: Float[np.ndarray, "n 2"], radius: float, samples: int) -> None:
     """A path in the clearance circle, with a dot at each revolution of so many samples."""
-    ax.add_patch(Circle((0, 0), radius, fill=False, color=GREY, linewidth=1.0, linestyle="--"))
-    ax.plot(*path.T, color=BLUE, linewidth=0.7, alpha=0.8)
-    ax.plot(*path[::samples].T, ".", color=BLACK, markersize=4)
+    ax.add_patch(Circle((0, 0), radius, fill=False, color=style.GREY, linewidth=1.0, linestyle="--"))
+    ax.plot(*path.T, color=style.BLUE, linewidth=0.7, alpha=0.8)
+    ax.plot(*path[::samples].T, ".", color=style.BLACK, markersize=4)
     limits = (-1.08 * radius, 1.08 * radius)
     ax.set(xlim=limits, ylim=limits, aspect="equal")
 
@@ -134,7 +114,7 @@ def simulation_figure(
     trajectory: Trajectory, forces: Forces, clearance: Float[np.ndarray, ""] | float, title: str = ""
 ) -> Figure:
     """Path, time history and each force of a trajectory."""
-    figure = new_figure(11.5, 6.4)
+    figure = style.new_figure(11.5, 6.4)
     grid = figure.add_gridspec(3, 2, width_ratios=(1, 1.7))
     history = figure.add_subplot(grid[0, 1])
     across, upward = (figure.add_subplot(grid[i, 1], sharex=history) for i in (1, 2))
@@ -144,7 +124,7 @@ def simulation_figure(
     force_history(trajectory, forces, 1, upward)
     if (legend := across.get_legend()) is not None:
         legend.remove()
-    return entitled(figure, title)
+    return style.entitled(figure, title)
 
 
 def strobe_section(
@@ -154,7 +134,7 @@ def strobe_section(
 
     **Arguments:** states at tau = 2 pi n [SI], coordinates before velocities; axes; names of the initial states.
     """
-    ax = axes_or_new(ax, 6.5, 5.0)
+    ax = style.axes_or_new(ax, 6.5, 5.0)
     along = (1, 1 + states.shape[-1] // 2)
     place, velocity = (quantity(component_names(states.shape[-1])[i]) for i in along)
     x, y = (states[..., i] * named.factor for i, named in zip(along, (place, velocity), strict=True))
@@ -162,10 +142,10 @@ def strobe_section(
         # Closed orbits of several initial states may coincide: the later ones are drawn smaller, on top.
         closed = _spread(across) < 1e-3 * _spread(x)
         size = 14.0 - 4 * min(i, 2) if closed else 7.0 if across.size <= 100 else 2.5
-        style = dots(START_COLOURS[i % len(START_COLOURS)], size) | {"rasterized": across.size > 5000}
-        ax.plot(across, up, **style, alpha=0.7, label=names[i] if names else f"start {i + 1}")
+        look = style.dots(START_COLOURS[i % len(START_COLOURS)], size) | {"rasterized": across.size > 5000}
+        ax.plot(across, up, **look, alpha=0.7, label=names[i] if names else f"start {i + 1}")
     ax.set(xlabel=place.label, ylabel=velocity.label, xlim=_wide_limits(x), ylim=_wide_limits(y))
-    legend_above(ax, ncols=len(x))
+    style.legend_above(ax, ncols=len(x))
     return ax
 
 
@@ -176,7 +156,7 @@ def _spread(values: np.ndarray) -> float:
 
 def _wide_limits(values: np.ndarray) -> tuple[float, float]:
     """Limits so wide that the rounding of a periodic orbit is not enlarged to a cloud."""
-    low, high = padded_limits(values)
+    low, high = style.padded_limits(values)
     centre, least = (low + high) / 2, 0.02 * max(abs(low), abs(high))
     return min(low, centre - least), max(high, centre + least)
 
@@ -187,10 +167,10 @@ def bearing_drawing(model: Any, run: Trajectory, history: RollerHistory, sample:
     The displacement of the cage and its clearances, a few tenths of a millimetre, are not enlarged. The longest arrow
     is the largest pocket force at any sample of the run.
     """
-    ax = axes_or_new(ax, 6.0, 6.0)
+    ax = style.axes_or_new(ax, 6.0, 6.0)
     ax.grid(False)
     ax.spines[:].set_visible(False)
-    bearing, ring = model.bearing, {"facecolor": GRID, "edgecolor": GREY, "linewidth": 0.8}
+    bearing, ring = model.bearing, {"facecolor": style.GRID, "edgecolor": style.GREY, "linewidth": 0.8}
     outside, bore = MM * float(bearing.outside_diameter) / 2, MM * float(bearing.bore) / 2
     outer, inner = MM * float(model.outer_radius), MM * float(model.inner_radius)
     ax.add_patch(Annulus((0, 0), outside, outside - outer, **ring))
@@ -200,16 +180,16 @@ def bearing_drawing(model: Any, run: Trajectory, history: RollerHistory, sample:
     centres = MM * run.rollers[sample, 2][:, None] * out
     share = history.inner_load[sample] / max(float(history.inner_load.max()), 1e-9)
     for centre, load in zip(centres, share, strict=True):
-        face = to_rgba(BLUE, 0.08 + 0.6 * float(load))
-        ax.add_patch(Circle(tuple(centre), half, facecolor=face, edgecolor=BLACK, linewidth=0.7))
+        face = to_rgba(style.BLUE, 0.08 + 0.6 * float(load))
+        ax.add_patch(Circle(tuple(centre), half, facecolor=face, edgecolor=style.BLACK, linewidth=0.7))
     for bar in _bars(model, run, sample):
-        ax.add_patch(Polygon(bar, facecolor=ORANGE, edgecolor=BLACK, linewidth=0.5, alpha=0.55))
+        ax.add_patch(Polygon(bar, facecolor=style.ORANGE, edgecolor=style.BLACK, linewidth=0.5, alpha=0.55))
     force = history.pocket_force[sample]
     length = LONGEST_ARROW * 2 * outside * force / max(float(np.abs(history.pocket_force).max()), 1e-9)
     pushed = np.abs(length) > 0.01 * LONGEST_ARROW * 2 * outside
     begin, arrows = centres + np.sign(force)[:, None] * half * along, length[:, None] * along
-    style: Any = dict(angles="xy", scale_units="xy", scale=1, width=0.005, color=VERMILION, zorder=5)
-    ax.quiver(*begin[pushed].T, *arrows[pushed].T, **style)
+    look: Any = dict(angles="xy", scale_units="xy", scale=1, width=0.005, color=style.VERMILION, zorder=5)
+    ax.quiver(*begin[pushed].T, *arrows[pushed].T, **look)
     reach = (-1.06 * outside, 1.06 * outside)
     ax.set(xticks=[], yticks=[], aspect="equal", xlim=reach, ylim=reach)
     largest = f"largest pocket force {np.abs(force).max():.0f} N (of {run.largest('pocket_force'):.0f} N at most"
@@ -239,11 +219,14 @@ def _bars(model: Any, run: Trajectory, sample: int) -> list[np.ndarray]:
 
 def slip_around(found: Around, ax: Axes | None = None) -> Axes:
     """Mean slip of the rollers, and their sliding speed on the inner ring, over the circumference."""
-    ax = _around_axis(axes_or_new(ax, 7.0, 3.2), "Slip of the rollers [%]")
+    ax = _around_axis(style.axes_or_new(ax, 7.0, 3.2), "Slip of the rollers [%]")
     other = ax.twinx()
     other.spines[["top", "left"]].set_visible(False)
     other.set_ylabel("Sliding on the inner ring [m/s]")
-    for axis, values, colour in ((ax, 100 * found.roller_slip, BLUE), (other, found.inner_sliding, VERMILION)):
+    for axis, values, colour in (
+        (ax, 100 * found.roller_slip, style.BLUE),
+        (other, found.inner_sliding, style.VERMILION),
+    ):
         axis.step(np.degrees(found.angle), values, where="mid", color=colour, linewidth=1.1)
         axis.yaxis.label.set_color(colour)
         axis.tick_params(axis="y", labelsize=9, colors=colour)
@@ -252,17 +235,17 @@ def slip_around(found: Around, ax: Axes | None = None) -> Axes:
 
 def pocket_force_around(found: Around, ax: Axes | None = None) -> Axes:
     """Mean pocket force over the circumference, of rollers that drive the cage and of rollers that brake it."""
-    ax = _around_axis(axes_or_new(ax, 7.0, 3.2), "Mean pocket force [N]")
+    ax = _around_axis(style.axes_or_new(ax, 7.0, 3.2), "Mean pocket force [N]")
     degrees, width = np.degrees(found.angle), 0.9 * 360 / len(found.angle)
-    ax.bar(degrees, found.driving_force, width, color=GREEN, label="rollers drive the cage")
-    ax.bar(degrees, -found.braking_force, width, color=VERMILION, label="rollers brake the cage")
-    ax.axhline(0, color=GREY, linewidth=0.8)
+    ax.bar(degrees, found.driving_force, width, color=style.GREEN, label="rollers drive the cage")
+    ax.bar(degrees, -found.braking_force, width, color=style.VERMILION, label="rollers brake the cage")
+    ax.axhline(0, color=style.GREY, linewidth=0.8)
     ax.legend(frameon=False, fontsize=8, loc="upper left")
     return ax
 
 
 def _around_axis(ax: Axes, ylabel: str) -> Axes:
-    ax.axvline(270, color=GREY, linewidth=0.8, linestyle="--")
+    ax.axvline(270, color=style.GREY, linewidth=0.8, linestyle="--")
     ax.set(
         xlim=(0, 360), xticks=range(0, 361, 90), xlabel="Place on the circumference [°], load at 270°", ylabel=ylabel
     )
@@ -271,37 +254,39 @@ def _around_axis(ax: Axes, ylabel: str) -> Axes:
 
 def marked_spectrum(spectrum: OrderSpectrum, orders: Mapping[str, float], ylabel: str, ax: Axes | None = None) -> Axes:
     """Amplitudes by order of the cage speed, with the frequencies of the bearing marked."""
-    ax = axes_or_new(ax, 7.0, 3.0)
+    ax = style.axes_or_new(ax, 7.0, 3.0)
     keep = (spectrum.order > 0) & (spectrum.order <= 1.15 * max(orders.values()))
     amplitude = spectrum.amplitude[keep]
-    ax.semilogy(spectrum.order[keep], np.maximum(amplitude, 1e-12), color=BLACK, linewidth=0.8)
-    for colour, (name, order) in zip(cycle(LINE_COLOURS), orders.items(), strict=False):
+    ax.semilogy(spectrum.order[keep], np.maximum(amplitude, 1e-12), color=style.BLACK, linewidth=0.8)
+    for colour, (name, order) in zip(cycle(style.LINE_COLOURS), orders.items(), strict=False):
         ax.axvline(order, color=colour, linewidth=1.1, linestyle="--", label=f"{name} {order:.3g}")
     ax.set(ylim=(0.5 * max(amplitude.min(), 1e-6 * amplitude.max()), 2 * amplitude.max()))
     ax.set(xlabel="Order of the cage speed", ylabel=ylabel)
-    legend_beside(ax, 7)
+    style.legend_beside(ax, 7)
     return ax
 
 
 def force_over_time(history: RollerHistory, ax: Axes | None = None) -> Axes:
     """Largest pocket force, and the land's force on the cage, over the revolutions of the cage."""
-    ax = axes_or_new(ax, 7.0, 3.0)
+    ax = style.axes_or_new(ax, 7.0, 3.0)
     turns = np.abs(history.angle - history.angle[0]) / (2 * np.pi)
-    ax.plot(turns, np.abs(history.pocket_force).max(axis=1), color=VERMILION, linewidth=0.6, label="largest pocket")
-    ax.plot(turns, np.hypot(*history.land_on_cage.T), color=BLUE, linewidth=0.8, label="land")
+    ax.plot(
+        turns, np.abs(history.pocket_force).max(axis=1), color=style.VERMILION, linewidth=0.6, label="largest pocket"
+    )
+    ax.plot(turns, np.hypot(*history.land_on_cage.T), color=style.BLUE, linewidth=0.8, label="land")
     ax.set(xlim=(0, turns[-1]), xlabel="Revolutions of the cage", ylabel="Force [N]")
-    legend_beside(ax, 8)
+    style.legend_beside(ax, 8)
     return ax
 
 
 def bearing_figure(model: Any, run: Trajectory, found: Rollers, title: str = "") -> Figure:
     """The bearing at its largest pocket force, the path of the cage, slips and forces around it, spectra if any."""
     history, rows = found.history, 4 if found.spectra else 3
-    figure = new_figure(12.0, 11.0 if found.spectra else 8.0)
+    figure = style.new_figure(12.0, 11.0 if found.spectra else 8.0)
     grid = figure.add_gridspec(rows, 2, height_ratios=(2.4, 1, 1, 1)[:rows])
     worst = int(np.abs(history.pocket_force).max(axis=1).argmax())
     bearing_drawing(model, run, history, worst, figure.add_subplot(grid[0, 0]))
-    path = axes_or_new(figure.add_subplot(grid[0, 1]))
+    path = style.axes_or_new(figure.add_subplot(grid[0, 1]))
     path_in_circle(path, history.place, 1.0, history.samples)
     path.set(xlabel="Cage centre, horizontal / clearance", ylabel="Cage centre, vertical / clearance")
     slip_around(found.around, figure.add_subplot(grid[1, 0]))
@@ -311,17 +296,17 @@ def bearing_figure(model: Any, run: Trajectory, found: Rollers, title: str = "")
         ax = marked_spectrum(spectrum, found.orders, SPECTRA.get(name, name), figure.add_subplot(grid[3, i]))
         if i == 0 and (legend := ax.get_legend()) is not None:
             legend.remove()
-    return entitled(figure, title)
+    return style.entitled(figure, title)
 
 
 def load_bars(distribution: LoadDistribution, ax: Axes | None = None) -> Axes:
     """Load on the inner raceway of every roller over its angle from the load; dashed lines bound the loaded zone."""
-    ax = axes_or_new(ax, 7.0, 3.6)
+    ax = style.axes_or_new(ax, 7.0, 3.6)
     angles = (np.degrees(np.asarray(distribution.roller_angles)) + 270) % 360 - 180
     half = float(np.degrees(np.asarray(distribution.half_angle)))
-    ax.bar(angles, np.asarray(distribution.inner_loads), width=0.5 * 360 / angles.size, color=BLUE)
+    ax.bar(angles, np.asarray(distribution.inner_loads), width=0.5 * 360 / angles.size, color=style.BLUE)
     for edge, label in ((-half, f"half angle {half:.1f}°"), (half, None)):
-        ax.axvline(edge, color=GREY, linewidth=1.0, linestyle="--", label=label)
+        ax.axvline(edge, color=style.GREY, linewidth=1.0, linestyle="--", label=label)
     ax.set(xlim=(-190, 190), xticks=range(-180, 181, 45))
     ax.set(xlabel="Angle from the load [°]", ylabel="Roller load on the inner raceway [N]")
     ax.legend(frameon=False, fontsize=9)
