@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from helpers import document, is_png, raw_sweep, refused
+from helpers import document, is_png, raw_sweep, read_columns, refused
 
 import jaxcage as jc
 from jaxcage.cli import main
 from jaxcage.files import load_model, read_bearing, write_template
 from jaxcage.lanes import load
-from jaxcage.show import read_columns
 
 
 RK4 = ["--solver", "rk4", "--steps", "256"]

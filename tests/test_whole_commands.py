@@ -6,13 +6,13 @@ import re
 
 import numpy as np
 import pytest
-from helpers import document, is_png, refused
+from helpers import document, is_png, read_columns, refused
 
 import jaxcage as jc
 from jaxcage.design import Runs, mean_gradient
 from jaxcage.files import subject_of, whole_bearing_from
 from jaxcage.lanes import load, stored_configuration
-from jaxcage.show import read_columns, read_operating
+from jaxcage.show import read_operating
 
 
 jc.enable_x64()

@@ -31,7 +31,6 @@ from .chance_tables import (
 from .columns import (
     branch_columns as branch_columns,
     curve_columns as curve_columns,
-    read_columns as read_columns,
     roller_columns as roller_columns,
     strobe_columns as strobe_columns,
     trajectory_columns as trajectory_columns,

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Float, Shaped
 
-from ..files import read_bytes, replacing
+from ..files import replacing
 from ..quantities import component_names, quantity
 from ..solve import Trajectory
 
@@ -19,27 +19,12 @@ if TYPE_CHECKING:
     from .maps import Axis
 
 
-LARGEST_TABLE = 4_000_000_000
-"""Bytes of a table that is read."""
-
-
 def write_columns(path: str | Path, columns: Mapping[str, Shaped[np.ndarray, " rows"]]) -> Path:
     """Write columns of one length under their names; nothing is left behind if that fails."""
     table = np.column_stack([np.asarray(column) for column in columns.values()])
     with replacing(path) as temporary:
         np.savetxt(temporary, table, fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
     return Path(path)
-
-
-def read_columns(path: str | Path) -> dict[str, Float[np.ndarray, " rows"]]:
-    """The columns of a file that `write_columns` wrote, by their heads.
-
-    **Raises:** `ValueError` for what is no table of numbers with a head over each column.
-    """
-    head, *rows = read_bytes(path, LARGEST_TABLE).decode().splitlines()
-    names = head.strip().split(",")
-    table = np.loadtxt(rows, delimiter=",", ndmin=2)
-    return dict(zip(names, table.T, strict=True))
 
 
 def trajectory_columns(

@@ -65,25 +65,12 @@ def quantities_table(title: str, found: xr.Dataset, names: Sequence[str]) -> Tab
 
 
 def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Table]:
-    """Quantities of one run with their standard errors; of a bearing with its rollers more of these.
-
-    An eighth of the circumference stands in a row: slip, load and pocket force of the rollers; lines of the spectra
-    stand beside the bearing's frequencies.
-    """
+    """Quantities of one run with their standard errors; lines of spectra beside the bearing's frequencies."""
     words = lambda q: q.text if len(q.text) <= LONGEST else head_of(q.name, q.unit)
     rows = [(words(quantity), value, quantity.unit) for quantity, value, _ in found.values()]
     tables = [value_table(title, rows, [error for _, _, error in found.values()])]
     if rollers is None:
         return tables
-    around = rollers.around
-    eighths = [np.floor(around.angle / (2 * np.pi) * 8).astype(int) == i for i in range(8)]
-    known = lambda f, x: [float(f(x[i])) if np.isfinite(x[i]).any() else math.nan for i in eighths]
-    columns = [Column("position, load at 270°", [f"{45 * i} to {45 * (i + 1)}°" for i in range(8)])]
-    columns.append(Column("slip", known(np.nanmean, around.roller_slip), "1", "%", digits=2))
-    for name in ("inner load", "driving force", "braking force"):
-        columns.append(Column(name, known(np.nanmean, getattr(around, name.replace(" ", "_"))), "N", digits=1))
-    columns.append(Column("largest force", known(np.nanmax, around.largest_force), "N", digits=0))
-    tables.append(Table("Rollers around the bearing: slip, load, pocket force", columns))
     columns = [Column("order of the cage's speed", (), key="order", digits=3), Column("amplitude", ())]
     columns.append(Column("at the frequency of", (), key="name"))
     for name, spectrum in rollers.spectra.items():

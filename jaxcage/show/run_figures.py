@@ -139,19 +139,13 @@ def strobe_section(
     place, velocity = (quantity(component_names(states.shape[-1])[i]) for i in along)
     x, y = (states[..., i] * named.factor for i, named in zip(along, (place, velocity), strict=True))
     for i, (across, up) in enumerate(zip(x, y, strict=True)):
-        # Closed orbits of several initial states may coincide: the later ones are drawn smaller, on top.
-        closed = _spread(across) < 1e-3 * _spread(x)
-        size = 14.0 - 4 * min(i, 2) if closed else 7.0 if across.size <= 100 else 2.5
-        look = style.dots(START_COLOURS[i % len(START_COLOURS)], size) | {"rasterized": across.size > 5000}
-        ax.plot(across, up, **look, alpha=0.7, label=names[i] if names else f"start {i + 1}")
+        # Orbits of several initial states may coincide: the later ones are drawn smaller, on top.
+        look = style.dots(START_COLOURS[i % len(START_COLOURS)], max(7.0 - 2 * i, 2.5) if across.size <= 100 else 2.5)
+        label = names[i] if names else f"start {i + 1}"
+        ax.plot(across, up, **look, rasterized=across.size > 5000, alpha=0.7, label=label)
     ax.set(xlabel=place.label, ylabel=velocity.label, xlim=_wide_limits(x), ylim=_wide_limits(y))
     style.legend_above(ax, ncols=len(x))
     return ax
-
-
-def _spread(values: np.ndarray) -> float:
-    finite = values[np.isfinite(values)]
-    return float(np.ptp(finite)) if finite.size else 0.0
 
 
 def _wide_limits(values: np.ndarray) -> tuple[float, float]:
