@@ -268,9 +268,10 @@ def map_(
     title, stem, count = f"{name} over speed and {y}", f"_speed_{y}", points or subject.usual((50, 12), (13, 8))
     document = {"x": "speed", "y": y, "x_range": (low * RPM, high * RPM), "y_range": (axis.lower, axis.upper)}
     said, files, tables = [], {}, []
-    if not no_points:
-        sides = (("speed", low, high), (y, axis.lower, axis.upper))
-        grid = [{side: np.linspace(*ends, n)} for (side, *ends), n in zip(sides, count, strict=True)]
+    if no_points:
+        subject.require_orbits("map --no-points")
+    else:
+        grid = {"speed": np.linspace(low, high, count[0])}, {y: np.linspace(axis.lower, axis.upper, count[1])}
         usual = subject.usual({"discard": 1000, "revolutions": 100, "blocks": 20}, {"discard": 20, "revolutions": 20})
         with show.computing(f"map {name}") as say:
             found = jc.label_map(model, *grid, **usual | run.settings, starts=starts, persist=persist, stage=say)
@@ -291,7 +292,7 @@ def map_(
     if curves:
         tables.insert(0, jc.show.curves_table(f"Edges of {title}", curves, axis))
         files["curve_data"] = f"{stem}.csv", jc.show.curve_columns(curves, axis)
-        said.insert(0, f"{len(curves)} edge{'s' * (len(curves) != 1)} followed")
+        said.insert(0, f"{jc.show.counted(len(curves), 'edge')} followed")
     files["figure"] = f"{stem}.png", jc.show.map_figure(axis, curves, found, title)
     notes = [f"Not followed: {edge} ({why})" for edge, why in refused.items()]
     said = f"Over speed and {y}: {', '.join(said) or 'no edge could be followed'}."
