@@ -13,9 +13,10 @@ import xarray as xr
 from jaxtyping import Float
 
 from .._errors import ArgumentError, NoResult
+from .._parameters import parameters
 from ..analysis import Edge, Stretch, Zone, Zones, failed, outcomes, stretches, zones
 from ..bearing import LoadDistribution, PublishedCase, load_distribution
-from ..design import MeanGradient, Runs, mean_gradient
+from ..design import DIRECTIONS, MeanGradient, Runs, mean_gradient
 from ..files import SpeedOf, Whose, own_rpm, split_owner, to_si
 from ..lanes import label_map, sweep
 from ..models import AbstractForcedSystem
@@ -294,7 +295,9 @@ def examine(
         if not quick:
             with timed("slopes of means"):
                 runs = Runs(at, starts=2, **LENGTH, blocks=2, exponents=0, tolerance=1e-4)
-                slopes = mean_gradient(model, runs)
+                value = parameters(model)
+                moved = [names for names in DIRECTIONS if all(float(value[name]) for name in names.split("+"))]
+                slopes = mean_gradient(model, runs, directions=moved)
         one = OneSpeed(operating[0], run, slopes)
     load = float(getattr(model, "load", 0.0))
     shared = load_distribution(model.bearing, load) if load > 0 else None  # pyright: ignore

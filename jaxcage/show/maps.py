@@ -52,6 +52,11 @@ class Axis:
         """Name with the unit in which values are shown."""
         return Column(self.name, (), self.unit).title
 
+    @property
+    def label(self) -> str:
+        """The same as words of a figure."""
+        return f"{self.head[:1].upper()}{style.readable(self.head[1:])}"
+
     def shown(self, values: Any) -> np.ndarray:
         """Values [SI] in the unit in which they are shown."""
         return np.asarray(values * factor(self.unit, SHOWN.get(self.unit, self.unit)))
@@ -148,7 +153,7 @@ def stability_map(axis: Axis, curves: Sequence[Curve], ax: Axes | None = None, f
         mesh = ax.pcolormesh(x, y, np.ma.masked_invalid(top_exponent(found)).T, **look)
         ax.figure.colorbar(mesh, ax=ax, label=quantity("largest_exponent").label, pad=0.01, extend="both")
         ax.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
-    ax.set_ylabel(style.readable(axis.head).capitalize())
+    ax.set_ylabel(axis.label)
     return label_speed(ax, axis.speed_text)
 
 
@@ -190,7 +195,9 @@ def map_figure(axis: Axis, curves: Sequence[Curve], found: xr.Dataset | None, ti
     rows = (len(names) + 3) // 2
     figure = style.new_figure(11.5, 1.0 + 3.8 * rows)
     cells = figure.subplots(rows, 2, squeeze=False).ravel()
-    stability_map(axis, curves, cells[0], found).set_title("Largest exponent", fontsize=10, loc="left", pad=20)
+    stability_map(axis, curves, cells[0], found).set_title(
+        "Largest exponent", fontsize=10, loc="left", pad=20 if curves else 6
+    )
     _colour_labels(cells[1], x, y, found["label"].values.astype(str))
     for ax, name in zip(cells[2:], names, strict=False):
         label, times = labelled(found[name])
@@ -200,7 +207,7 @@ def map_figure(axis: Axis, curves: Sequence[Curve], found: xr.Dataset | None, ti
         figure.colorbar(drawn, ax=ax)
         ax.set_title(label, fontsize=10, loc="left")
     for ax in cells[1 : 2 + len(names)]:
-        ax.set_ylabel(style.readable(axis.head).capitalize())
+        ax.set_ylabel(axis.label)
         label_speed(ax, axis.speed_text).grid(False)
     for ax in cells[2 + len(names) :]:
         ax.set_axis_off()
