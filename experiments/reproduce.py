@@ -27,8 +27,7 @@ ZONE_RANGE_RPM = (4000.0, 27500.0)
 """Speeds between which a case should have exactly two zones."""
 LASTING, AT_FIRST, LOSS = "lasting", "at first", "synchronous-loss"
 """Chaos that lasts beyond the horizon; chaos while observed, lasting or not; loss of the synchronous orbit."""
-WIDE_RPM = 500.0  # smallest width of the zones that a diagram over 25000 rpm shows
-SECTION_RPM = 8500.0  # of fig. 9
+SECTION_RPM, WIDE_RPM = 8500.0, 500.0  # speed of fig. 9; smallest width of the zones that a diagram shows
 QUICK: dict[str, Any] = {"speeds": 101, "discard": 150, "revolutions": 100, "orbits": False}
 Conclusion = tuple[str, str, tuple[bool, ...]]  # claim of the paper, evidence of the model, checks that decide
 
