@@ -47,7 +47,7 @@ def _ours(edge: dict[str, Any], apart: str) -> str:
 
 
 def against_paper(text: str) -> str:
-    """The edges of lasting chaos of `jaxcage reproduce`, a case to a row."""
+    """The edges of lasting chaos of `experiments.reproduce`, a case to a row."""
     cases: dict[str, list[str]] = {}
     for edge in (e for e in json.loads(text)["edges"] if e["kind"] == "lasting"):
         cases.setdefault(edge["case"], []).append(f"{edge['published_rpm']:.0f} / {_ours(edge, ' ({:+.1f} %)')}")
@@ -55,7 +55,7 @@ def against_paper(text: str) -> str:
 
 
 def every_kind(text: str) -> str:
-    """The edges of every kind of `jaxcage reproduce`."""
+    """The edges of every kind of `experiments.reproduce`."""
     document = json.loads(text)
     kinds, rows = list(document["summary"]), {}
     for edge in document["edges"]:
@@ -73,7 +73,7 @@ def speed(text: str) -> str:
 
 
 README, EDGE, DESIGN, PAPER = "README.md", "docs/edges.md", "docs/design.md", "docs/reproduction.md"
-REPRODUCE = "jaxcage reproduce --json"
+REPRODUCE = "python -m experiments.reproduce --json"
 BETTER = 'jaxcage design nu2310 --speed "10000 rpm shaft"'
 CHAOS = ("Chaotic zones of", "Transient chaos of")
 BLOCKS: dict[str, tuple[str, str, Part]] = {

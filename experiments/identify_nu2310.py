@@ -25,12 +25,12 @@ from pathlib import Path
 import cma
 import numpy as np
 import xarray as xr
+from reproduce import LASTING, WIDE_RPM, compare_edges, zones_in_range
 from scipy.stats import qmc
 
 import jaxcage as jc
 from jaxcage.analysis import CHAOS_THRESHOLD
 from jaxcage.bearing import PUBLISHED_CASES, PublishedCase
-from jaxcage.show.reproduction import LASTING, compare_edges, wide_zones
 
 
 jc.enable_x64()
@@ -256,9 +256,10 @@ def check(models: dict[str, jc.CageModel], ledger: Ledger, values: dict[str, flo
         model = with_values(case, ledger.unknowns, values)
         found = jc.zones(jc.sweep(model, jc.rpm(2500, 27500, 251), method=method, horizon=horizon)).zones
         rows = compare_edges(PUBLISHED_CASES[name], found, LASTING)
-        errors += [30.0 if r.error_percent is None else abs(r.error_percent) for r in rows]
-        said = [f"{r.edge} " + ("none" if r.ours_rpm is None else f"{r.error_percent:+.1f} %") for r in rows]
-        print(f"{name}: {', '.join(said)}; {len(wide_zones(found))} wide zones", flush=True)
+        off = {row["edge"]: row["error_percent"] for row in rows}
+        errors += [30.0 if error is None else abs(error) for error in off.values()]
+        said = [f"{edge} " + ("none" if error is None else f"{error:+.1f} %") for edge, error in off.items()]
+        print(f"{name}: {', '.join(said)}; {len(zones_in_range(found, WIDE_RPM))} wide zones", flush=True)
     print(f"{np.sum(np.array(errors) <= 10)} of {len(errors)} within 10 %, median error {np.median(errors):.1f} %")
 
 

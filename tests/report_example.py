@@ -10,9 +10,8 @@ import jaxcage as jc
 from jaxcage.analysis import zones
 from jaxcage.bearing import PUBLISHED_CASES, load_distribution
 from jaxcage.orbits import Branch, Curve, Point, Sensitivity, Stretch, SynchronousOrbits, loss_zones
-from jaxcage.show import Findings, Operating
-from jaxcage.show.findings import Map, Orbits
-from jaxcage.show.parameter_axes import Axis
+from jaxcage.show import Axis, Findings, Operating
+from jaxcage.show.findings import Orbits
 
 
 PER_RPM = np.pi / 30
@@ -104,7 +103,7 @@ def findings(name: str = "1a", quick: bool = False, operating: tuple[Operating, 
     mapped = xr.Dataset(
         {"label": (axes, labels), "exponents": ((*axes, "exponent"), grid)}, {"speed": across, "guidance_gap": gaps}
     )
-    chart = Map(Axis("guidance_gap", gaps[0], gaps[-1], "m"), mapped, [] if quick else [curve], {})
+    axis = Axis("guidance_gap", gaps[0], gaps[-1], "m")
     located = [] if quick else list(loss.edges.items())
     edges = {n: slopes(model, n, p.kind, p.speed_rpm, 0.5 + i) for i, (n, p) in enumerate(located)}
     return Findings(
@@ -114,7 +113,7 @@ def findings(name: str = "1a", quick: bool = False, operating: tuple[Operating, 
         sweep=sweep,
         operating=operating,
         zones=zones(sweep),
-        orbits=Orbits(found, loss, edges, chart, "by hand"),
+        orbits=Orbits(found, loss, edges, axis, mapped, [] if quick else [curve], {}, "by hand"),
         statics=load_distribution(model.bearing, model.load),
         quick=quick,
         seconds={"sweep": 12.0, "synchronous orbits": 34.0},

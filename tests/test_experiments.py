@@ -11,7 +11,9 @@ import pytest
 
 
 EXPERIMENTS = pathlib.Path(__file__).parents[1] / "experiments"
-SCRIPTS = sorted(p for p in EXPERIMENTS.glob("*.py") if p.name not in ("_size.py", "identify_nu2310.py"))
+SCRIPTS = sorted(
+    p for p in EXPERIMENTS.glob("*.py") if p.name not in ("_size.py", "identify_nu2310.py", "reproduce.py")
+)
 NAMES = [script.stem for script in SCRIPTS]
 SAVED = re.compile(r'^save\(.*"(\w+)"\)', re.M)
 """The line of a cell that saves and shows a figure."""

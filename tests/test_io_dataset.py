@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from helpers import cage_sweep
+from helpers import cage_sweep, read_columns
 
 import jaxcage as jc
 from jaxcage.files import check_writable, configuration, model_from
 from jaxcage.lanes import load, save, stored_configuration
-from jaxcage.show import read_columns, trajectory_columns, write_columns
+from jaxcage.show import trajectory_columns, write_columns
 
 
 def test_round_trip(tmp_path: Path):

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from energies import cage_angular_momentum, kinetic_energy, potential_energy
-from helpers import beyond_range
+from helpers import beyond_range, read_columns
 from PIL import Image
 from scipy.optimize import brentq, fsolve
 from test_whole_reference import everything
@@ -17,7 +17,6 @@ from test_whole_reference import everything
 import jaxcage as jc
 from jaxcage.cli import main
 from jaxcage.models import INTEGRATED, LEDGER, BearingState, Bodies, Rollers, rolling_start, state_scale
-from jaxcage.show import read_columns
 
 
 SPEED = jc.rpm(10000)

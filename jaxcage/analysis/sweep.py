@@ -115,7 +115,8 @@ def outcomes(found: xr.Dataset) -> dict[str, int]:
 def summary(found: xr.Dataset) -> str:
     """A sweep in a few lines: lanes by label, lanes without a certain label, failures, accuracy."""
     labels: Shaped[np.ndarray, "*lanes"] = found["label"].values
-    rpm, sizes = found["rpm"].values, ", ".join(f"{n} {axis}s" for axis, n in zip(found["label"].dims, labels.shape))
+    sizes = ", ".join(f"{n} {axis}{'s' * (n != 1)}" for axis, n in zip(found["label"].dims, labels.shape))
+    rpm = found["rpm"].values
     lines = [
         f"{sizes}, {rpm.min():.0f} to {rpm.max():.0f} rpm, {length(found)}",
         *(f"  {count:6d} {label}" for label, count in sorted(collections.Counter(labels.ravel().tolist()).items())),

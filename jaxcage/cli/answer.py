@@ -6,7 +6,7 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,16 +72,8 @@ def _write(path: Path, content: Any, show: ShowOptions, subject: Subject | None)
         else:
             if subject is not None and subject.shaft is not None:
                 jc.show.add_shaft_axes(content, 1 / subject.shaft)
-            jc.show.restyle(content, show.style).savefig(temporary, dpi=content.dpi)
+            content.savefig(temporary, dpi=content.dpi)
     return path
-
-
-def drawn(title: str, draw: Callable[[Any], Any], width: float = 9.0, height: float = 5.0) -> Any:
-    """A figure of one diagram, which `draw` draws on its axes."""
-    figure = jc.show.new_figure(width, height)
-    draw(figure.subplots())
-    figure.suptitle(title, fontsize=11)
-    return figure
 
 
 def print_answer(answer: Answer, as_json: bool) -> None:

@@ -1,8 +1,8 @@
-"""Commands about the case itself: its file, its statics, one impact, the paper's results, a report."""
+"""Commands about the case itself: its file, its statics, a report."""
 
 import shlex
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import tyro
@@ -11,13 +11,10 @@ import jaxcage as jc
 
 from .._errors import InputError
 from . import options as o
-from .answer import Answer, drawn
+from .answer import Answer
 from .progress import visible
 from .speed_commands import draw, zone_tables
 from .subject import RPM, read_case
-
-
-QUICK: dict[str, Any] = {"speeds": 101, "discard": 150, "revolutions": 100, "section_revolutions": 504, "orbits": False}
 
 
 def init(
@@ -89,67 +86,9 @@ def statics(
         "roller_centrifugal_force": float(bearing.roller_centrifugal_force(shaft)),
     }
     said = f"{np.sum(loads > 0)} of {loads.size} rollers carry {force:g} N, the most loaded one {np.max(loads):.0f} N."
-    figure = drawn(title, lambda ax: jc.show.load_bars(found, ax), 7.0, 3.8)
+    figure = jc.show.drawn(lambda ax: jc.show.load_bars(found, ax), 7.0, 3.8, title)
     data = {f"{name} [{unit}]": np.asarray(x) for name, (x, unit) in columns.items()}
     return Answer(said, tables, [], document, subject, {"figure": (".png", figure), "data": (".csv", data)})
-
-
-def impact(
-    case: o.Case,
-    *,
-    speed: o.Speed,
-    duration: Annotated[float, o.number("lie between 0 and 1000 ms", lambda x: 0 < x <= 1000, "ms")] = 0.6,
-    show: o.ShowOptions = o.ShowOptions(),
-) -> Answer:
-    """Impact of one roller on a cage bar: history of both forces.
-
-    Args:
-        duration: Length of the history [ms].
-    """
-    subject = read_case(case)
-    subject.require_orbits("impact")
-    at, bearing = subject.speed(speed), subject.model.bearing
-    law = getattr(subject.model.impact, "oscillator", jc.forces.PocketImpact())  # a synchronous impact has none
-    if not float(bearing.pocket_clearance) > 0:
-        raise InputError(f"The pocket clearance of {subject.name} must be above 0 for an impact, but it is 0.")
-    with show.computing(f"impact {subject.name}"):
-        v0 = jc.forces.approach_speed(law.approach_ratio, at, bearing.pocket_clearance)
-        found = jc.forces.impact_history(law, bearing.roller_mass, v0, 1e-3 * duration)
-    where, stem = f"{subject.name}, {subject.at(at)}", f"_{speed:g}rpm"
-    table, values = jc.show.impact_table(f"Impact in {where}", found, float(v0))
-    units = {"time": "s", "contact_force": "N", "bar_force": "N", "roller_position": "m", "bar_position": "m"}
-    columns = {f"{name} [{unit}]": np.asarray(getattr(found, name)) for name, unit in units.items()}
-    bar = {name: float(getattr(law, name)) for name in jc.parameters(law)}
-    note = "Bar and contact (SI): " + ", ".join(f"{name} {value:g}" for name, value in bar.items())
-    said = f"The roller hits the bar at {float(v0):.3g} m/s with up to {values['peak_contact_force']:.4g} N."
-    said += " It is still in contact at the end: give a longer --duration." if values["ends_in_contact"] else ""
-    figure = drawn(where, lambda ax: jc.show.impact_forces(found, ax), 7.0, 4.0)
-    files = {"figure": (f"{stem}.png", figure), "data": (f"{stem}.csv", columns)}
-    return Answer(said, [table], [note], subject.both(at) | values | {"bar": bar}, subject, files)
-
-
-def reproduce(
-    *,
-    constants: Literal["identified", "preliminary"] = "identified",
-    quick: o.Quick = False,
-    show: o.ShowOptions = o.ShowOptions(),
-) -> Answer:
-    """The paper beside this model: edges, conclusions, and the orbit diagrams of figures 7 and 8.
-
-    Args:
-        constants: Set of constants that the paper does not print.
-    """
-    from ..show import reproduction
-
-    models = {name: jc.case(name, constants) for name in jc.bearing.PUBLISHED_CASES}
-    with show.computing("reproduce") as say:
-        runs = reproduction.run_all(models, report=say, **(QUICK if quick else {}))
-        document, tables, notes = reproduction.reproduction(runs)
-    verdicts = [each["verdict"] for each in document["conclusions"]]
-    partly = f"{verdicts.count('holds in part')} in part"
-    said = f"{verdicts.count('holds')} of the paper's {len(verdicts)} conclusions hold, {partly}."
-    files = {name: (f"_{name}.png", figure) for name, figure in reproduction.paper_diagrams(runs)}
-    return Answer(said, tables, notes, {"quick": quick, "constants": constants, **document}, files=files)
 
 
 def report(
@@ -190,5 +129,7 @@ def report(
     document["operating"] = [{"low_rpm": x.low_rpm, "high_rpm": x.high_rpm, **verdicts} for x, verdicts in assessed]
     notes = [f"Stages: {', '.join(f'{stage} {seconds:.0f} s' for stage, seconds in found.seconds.items())}"]
     tables += zone_tables(subject, found.sweep, found.zones)
+    if (orbits := found.orbits) is not None:
+        tables.append(jc.show.loss_table(subject.name, orbits.found, orbits.loss, subject.published, subject.beside))
     files = {"report": (".html", html)}
     return Answer(f"{'; '.join(each) or 'The report is written'}.", tables, notes, document, subject, files)

@@ -13,7 +13,7 @@ import jaxcage as jc
 
 from .._errors import InputError
 from . import options as o
-from .answer import Answer, drawn
+from .answer import Answer
 from .subject import RPM, Subject, read_case
 from .values import no_worse_balance, read_bounds, read_each, read_scatter
 
@@ -196,7 +196,7 @@ def sensitivity(
             edges = [s for s in jc.orbits.sensitivities(model, loss.edges).values() if s.trusted]
             slopes = [(s, jc.show.not_fixed(model, s.elasticity)) for s in edges]
             bars = lambda ax: jc.show.elasticity_bars(jc.show.to_be_turned(model, edges), ax)
-            files |= {"figure": (".png", drawn(name, bars, 9.0, 2.2 + 1.2 * len(edges)))} if edges else {}
+            files |= {"figure": (".png", jc.show.drawn(bars, 9.0, 2.2 + 1.2 * len(edges), name))} if edges else {}
     deviation = tolerance / 100 / math.sqrt(3)
     budgets = [d.tolerance_budget(slope, dict.fromkeys(names, deviation)) for slope, names in slopes]
     most, what = max(shares.total, key=shares.total.__getitem__), subject.usual("chaotic speeds", of.replace("_", " "))
@@ -220,41 +220,6 @@ def _power(samples: int) -> int:
     if samples < 2 or samples & (samples - 1):
         raise InputError(f"Option --samples must be a power of 2, but {samples} was given.")
     return samples
-
-
-def unknowns(
-    case: o.Case,
-    *,
-    over: o.Range = o.Range(),
-    samples: o.FromTwo = 16,
-    seed: o.Seed = 0,
-    steps: o.StepOptions = o.StepOptions(),
-    show: o.ShowOptions = o.ShowOptions(),
-) -> Answer:
-    """The measurement that would decide: shares of each range of a TOML file in the chaotic speeds, by default of 8.
-
-    Args:
-        samples: Base samples of the Sobol indices, a power of 2.
-    """
-    subject = read_case(case)
-    subject.require_ranges()
-    at, info, labels = subject.range(over, 8), jc.parameter_info(subject.model), [u.label for u in subject.unknowns]
-    with show.computing(f"unknowns {subject.name}") as say:
-        told = {"method": steps.method, "progress": partial(say, "draws")}
-        share = partial(jc.design.chaotic_shares, subject.model, subject.unknowns, at, **told)
-        found = jc.design.sobol_of(share, labels, samples=_power(samples), seed=seed)
-    sources = {u.label: info[u.names[0]].source for u in subject.unknowns}
-    most = max(found.total, key=found.total.__getitem__)
-    said = f"Measure {most} first: {sources[most]}."
-    if not any(found.total.values()):
-        said = "Nothing to decide: every draw does the same."
-    elif most in found.doubtful:
-        said = "These draws do not tell what to measure first."
-    document = {"designs": found.evaluations, "doubtful": found.doubtful, "speeds_rpm": at * RPM}
-    document["measure"] = {"what": most, "how": sources[most]}
-    notes = [*([found.warning] if found.warning else []), *(f"{label}: {how}" for label, how in sources.items())]
-    table = jc.show.sobol_table(f"Chaotic share of {subject.name}", found)
-    return Answer(said, [table], notes, document, subject.certain)
 
 
 def identify(

@@ -3,11 +3,9 @@
 import contextlib
 import dataclasses
 import math
-import os
 import re
 from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import tyro
 from tyro.conf import arg
@@ -51,11 +49,10 @@ def read_quantity(text: str, unit: str) -> float:
         return float(text)
     if not unit:
         raise ValueError(f'must be a number, but is "{text}".')
-    from ..files import SpeedOf, split_owner, to_si  # loads pint
+    from ..files import read_rpm, to_si  # loads pint
 
     try:
-        speed, whose = split_owner(text) if unit == "rpm" else (text, None)
-        return to_si(speed, unit) if whose is None else SpeedOf(to_si(speed, unit), whose)
+        return read_rpm(text) if unit == "rpm" else to_si(text, unit)
     except ValueError as error:
         example = EXAMPLES[unit]
         raise ValueError(f"must be a number in {unit}, or one with a unit such as {example}, but {error}.") from None
@@ -104,13 +101,6 @@ def text(
     return _option(metavar, checked)
 
 
-def is_within(path: str) -> bool:
-    """True if a path leads to a place within the folder that it starts from, by names that a disk takes."""
-    parts = Path(path).parts
-    short = all(len(os.fsencode(part)) <= 200 for part in parts)  # temporary names are longer
-    return bool(parts) and short and not Path(path).is_absolute() and ".." not in parts
-
-
 _SPEED = number("be a speed above 0 rpm", lambda x: x > 0, "rpm")
 _OWN = "Bare numbers are the cage's [rpm], of a bearing with its rollers, or where a file says so, the shaft's"
 _SIDES = f"be ACROSSxUPWARDS, each from {SIDE[0]} to {SIDE[-1]}, e.g. 300x300"
@@ -136,7 +126,7 @@ OptionalText = Annotated[str | None, text()]
 Price = Annotated[float | None, number("be at least 0", lambda x: x >= 0)]
 Texts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 Points = Annotated[tuple[int, int] | None, pair("x", _SIDES, lambda a, b: a in SIDE and b in SIDE)]
-Shard = Annotated[tuple[int, int], pair("/", "be I/N with I from 1 to N, e.g. 1/4", lambda i, n: 1 <= i <= n)]
+Shard = Annotated[tuple[int, int] | None, pair("/", "be I/N with I from 1 to N, e.g. 1/4", lambda i, n: 1 <= i <= n)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -233,8 +223,6 @@ class ShowOptions:
 
     out: Annotated[str, text("name a folder")] = "out"
     """Folder for figures and data; it is made if need be."""
-    style: Literal["light", "dark", "print"] = "light"
-    """Style of the figures: for white pages, dark screens, or black-and-white paper."""
     json: bool = False
     """Print one JSON document on standard output instead of tables."""
     no_cache: bool = False

@@ -2,7 +2,7 @@
 
 import dataclasses
 from functools import partial
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,9 +10,9 @@ import jaxcage as jc
 
 from .._errors import ArgumentError, InputError, NoResult
 from . import options as o
-from .answer import Answer, drawn
+from .answer import Answer
 from .speed_commands import chances, counted, said_of, swept, zone_tables
-from .subject import Subject, read_case
+from .subject import RPM, Subject, read_case
 
 
 def zones(
@@ -48,8 +48,7 @@ def zones(
         jc.show.loss_table(subject.name, orbits, loss, subject.published, subject.beside),
         *([jc.show.elasticities_table(subject.name, slopes, subject.beside)] if slopes else []),
     ]
-    notes = [*jc.show.source_notes(explained), *jc.show.contact_notes(model, loss.edges, method)]
-    notes += [*jc.show.unsettled_notes(orbits), *answer.notes]
+    notes = [*jc.show.source_notes(explained), *jc.show.unsettled_notes(orbits), *answer.notes]
     return dataclasses.replace(answer, sentence=said_of(found, explained.zones), tables=tables, notes=notes)
 
 
@@ -93,8 +92,8 @@ def bifurcations(
     found, loss = _searched(subject, over, discard, steps.method, show)
     main = found.branches[0 if loss.principal is None else loss.principal.branch]
     orbits = lambda ax: jc.show.orbit_diagram_with_branches(found.sweep, found.branches, 1, ax)
-    circle = drawn(f"{name}: multipliers", lambda ax: jc.show.multiplier_circle(main, ax), 7.0, 6.0)
-    files = {"figure": (".png", drawn(f"{name}: synchronous orbits", orbits, 10.0, 6.0))}
+    circle = jc.show.drawn(lambda ax: jc.show.multiplier_circle(main, ax), 7.0, 6.0, f"{name}: multipliers")
+    files = {"figure": (".png", jc.show.drawn(orbits, 10.0, 6.0, f"{name}: synchronous orbits"))}
     files |= {"multipliers": ("_multipliers.png", circle), "data": (".csv", jc.show.branch_columns(found.branches))}
     tables = [
         jc.show.loss_table(name, found, loss, subject.published, subject.beside),
@@ -103,7 +102,6 @@ def bifurcations(
     ]
     notes = [
         *jc.show.coexisting_notes(loss),
-        *jc.show.contact_notes(subject.model, loss.edges, steps.method),
         *jc.show.unsettled_notes(found),
         f"Further bifurcations, on unstable parts: {len(found.points) - len(found.edges)} (listed by --json)",
         f"Settled orbits that are on no branch: {found.missed}",
@@ -121,7 +119,6 @@ def gradient(
     zone: o.FromZero = 0,
     by: tuple[str, ...] = (),
     designs: o.FromTwo = 64,
-    spread: Annotated[float, o.number("be above 0 and at most 0.3", lambda x: 0 < x <= 0.3)] = 0.05,
     chaos: bool = False,
     seed: o.Seed = 0,
     means: o.MeanOptions = o.MeanOptions(),
@@ -138,13 +135,12 @@ def gradient(
         zone: With --lasting: number of the zone, as `jaxcage sweep` counts them; 0 takes all.
         by: With --lasting or --speed: parameters, of which several joined by + change together.
         designs: With --lasting or --speed: designs around this one from which slopes are estimated.
-        spread: With --speed: relative size of the changes of the parameters.
         chaos: With --speed: the mean slope of the largest Lyapunov exponent as well.
     """
     subject = read_case(case, means.load)
     model, method, name = subject.model, steps.method, subject.name
     if subject.with_rollers:
-        given = {"directions": by or jc.design.DIRECTIONS, "designs": designs, "spread": spread, "seed": seed}
+        given = {"directions": by or jc.design.DIRECTIONS, "designs": designs, "seed": seed}
         return _of_means(subject, means, steps.tolerance or 1e-4, chaos, given, show)
     if means.speed is not None:
         raise InputError(f"Option --speed goes with a bearing with its rollers, but {name} is a cage.")
@@ -163,7 +159,7 @@ def gradient(
     ends: list[Any] = [trusted.get(f"zone 1 {end}") for end in ("onset", "exit")]
     each = [*([jc.orbits.width(ends[0], ends[1], "zone 1 width")] if all(ends) else []), *trusted.values()]
     bars = lambda ax: jc.show.elasticity_bars(jc.show.to_be_turned(model, each), ax)
-    files = {"figure": (".png", drawn(f"{name}: elasticities of the edges", bars, 9.0, 2.2 + 1.2 * len(each)))}
+    figure = jc.show.drawn(bars, 9.0, 2.2 + 1.2 * len(each), f"{name}: elasticities of the edges")
     tables = [
         jc.show.elasticities_table(name, edges, subject.beside),
         jc.show.width_table(f"Widths of the synchronous-loss zones of {name}", edges, jc.show.FIRST),
@@ -172,7 +168,7 @@ def gradient(
     edge, slope = max(trusted.items(), key=lambda item: abs(item[1].elasticity["guidance_gap"]))
     by_gap = f"1 % more guidance gap moves it by {slope.elasticity['guidance_gap']:+.2f} %"
     said = f"{edge.capitalize()}, at {slope.value_rpm:.0f} rpm, answers most to the gap: {by_gap}."
-    return Answer(said, tables, jc.show.missing_notes(edges), {}, subject, files)
+    return Answer(said, tables, jc.show.missing_notes(edges), {}, subject, {"figure": (".png", figure)})
 
 
 def _of_lasting(subject: Subject, over: o.Range, zone: int, given: dict[str, Any], show: o.ShowOptions) -> Answer:
@@ -233,13 +229,11 @@ def _of_means(
 def map_(
     case: o.Case,
     *,
-    x: str = "speed",
     y: o.OptionalText = None,
     over: o.Range = o.Range(),
     lower: o.OptionalText = None,
     upper: o.OptionalText = None,
     points: o.Points = None,
-    speed: o.OptionalSpeed = None,
     starts: o.FromOne = 1,
     persist: o.FromZero = 0,
     no_points: bool = False,
@@ -247,11 +241,10 @@ def map_(
     run: o.RunOptions = o.RunOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Stability map over two parameters: labels and the largest exponent, quantities of a bearing, and edges on top.
+    """Stability map over speed and a parameter: labels, the largest exponent, what the model reports, edges on top.
 
     Args:
-        x: Parameter across: speed, or any parameter of the model.
-        y: Parameter upwards; guidance_gap if left out, of a bearing with its rollers its load.
+        y: The parameter; guidance_gap if left out, of a bearing with its rollers its load.
         lower: Lowest value of y, in SI units or with a unit, e.g. "0.4 mm"; 0.8 of its value if left out.
         upper: Highest value of y; 1.25 of its value if left out.
         points: Grid of points at which lanes are run, e.g. 300x300.
@@ -261,59 +254,46 @@ def map_(
         no_curves: Do not follow the edges of the synchronous orbit.
     """
     subject = read_case(case)
-    model, name, known = subject.model, subject.name, [*jc.parameters(subject.model)]
-    y, ends = y or subject.usual("guidance_gap", "load"), {}
-    for option, given, allowed in (("--y", y, known), ("--x", x, ["speed", *known])):
-        if given not in allowed:
-            raise InputError(f"Option {option} must be one of {', '.join(allowed)}, but '{given}' was given.")
-    if x == y:
-        raise InputError(f"Options --x and --y must be two different parameters, but both are {x}.")
-    if x == "speed" and speed is not None:
-        raise InputError("Option --speed goes with an --x that is not the speed.")
+    model, name, y = subject.model, subject.name, y or subject.usual("guidance_gap", "load")
+    if y not in (info := jc.parameter_info(model)):
+        raise InputError(f"Option --y must be one of {', '.join(info)}, but '{y}' was given.")
+    given: dict[str, Any] = {}
     for end, text in (("lower", lower), ("upper", upper)):
         try:
-            ends |= {} if text is None else {end: jc.files.to_si(text, jc.parameter_info(model)[str(y)].unit)}
+            given |= {} if text is None else {end: jc.files.to_si(text, info[y].unit)}
         except ValueError as error:
             raise ArgumentError(end, said=f"{error}.") from error
-    at = None if x == "speed" or no_points else subject.speed(speed)
     low, *_, high = subject.range(o.Range(over.first, over.last), 2)
-    across = jc.show.Axis(x, low, high, "rad/s") if x == "speed" else jc.show.parameter_axis(model, x)
-    up, curves, refused = jc.show.parameter_axis(model, str(y), **ends), [], {}
-    found: Any = None
-    document, title = {"x": x, "y": y, "x_range": across.range, "y_range": up.range}, f"{name} over {x} and {y}"
-    files, tables, stem = {}, [], f"_{x}_{y}"
-    if not no_points:
-        count = points or subject.usual((50, 12), (13, 8))
-        grid = [
-            {axis.name: np.linspace(axis.lower, axis.upper, n)} for axis, n in zip((across, up), count, strict=True)
-        ]
+    axis, found, curves, refused = jc.show.parameter_axis(model, y, **given), None, [], {}
+    title, stem, count = f"{name} over speed and {y}", f"_speed_{y}", points or subject.usual((50, 12), (13, 8))
+    document = {"x": "speed", "y": y, "x_range": (low * RPM, high * RPM), "y_range": (axis.lower, axis.upper)}
+    said, files, tables = [], {}, []
+    if no_points:
+        subject.require_orbits("map --no-points")
+    else:
+        grid = {"speed": np.linspace(low, high, count[0])}, {y: np.linspace(axis.lower, axis.upper, count[1])}
         usual = subject.usual({"discard": 1000, "revolutions": 100, "blocks": 20}, {"discard": 20, "revolutions": 20})
-        given = {"speed": at, "starts": starts, "persist": persist, **usual, **run.settings}
         with show.computing(f"map {name}") as say:
-            found = jc.label_map(model, *grid, **given, stage=say)
+            found = jc.label_map(model, *grid, **usual | run.settings, starts=starts, persist=persist, stage=say)
         jc.show.require_some(found)
-        document |= {"points": count, "labels": counted(found), "exponents": jc.show.top_exponent(found)}
-        tables.append(jc.show.shares_table(f"Points of {title}", "label", document["labels"]))
-        files["data"] = f"{stem}.zarr", found
+        labels, files["data"] = counted(found), (f"{stem}.zarr", found)
+        document |= {"points": count, "labels": labels, "exponents": jc.show.top_exponent(found)}
+        tables.append(jc.show.shares_table(f"Points of {title}", "label", labels))
+        said.append(f"most points are {max(labels, key=labels.__getitem__)}")
     if not (no_curves or subject.with_rollers):
         try:
             _, loss = _searched(subject, over, 1000 if run.discard is None else run.discard, run.method, show, "follow")
             with show.computing(f"edges of {name}") as say:
-                curves, refused = jc.show.follow_edges(model, loss.edges, across, up, run.method, say)
+                curves, refused = jc.show.follow_edges(model, loss.edges, (low, high), axis, run.method, say)
         except NoResult as error:
             if found is None:
                 raise
             refused = {"edges": str(error).rstrip(".")}
     if curves:
-        tables.insert(0, jc.show.curves_table(f"Edges of {title}", curves, across, up))
-        files["curve_data"] = f"{stem}.csv", jc.show.curve_columns(curves, across, up)
-    draw = lambda ax: jc.show.stability_map(curves, ax, found=found, unit=up.unit)
-    if subject.with_rollers:
-        files["figure"] = f"{stem}.png", jc.show.map_figure(found, title, up.unit)
-    elif x == "speed":
-        files["figure"] = f"{stem}.png", drawn(title, draw, 10.0, 6.0)
+        tables.insert(0, jc.show.curves_table(f"Edges of {title}", curves, axis))
+        files["curve_data"] = f"{stem}.csv", jc.show.curve_columns(curves, axis)
+        said.insert(0, f"{jc.show.counted(len(curves), 'edge')} followed")
+    files["figure"] = f"{stem}.png", jc.show.map_figure(axis, curves, found, title)
     notes = [f"Not followed: {edge} ({why})" for edge, why in refused.items()]
-    labels, said = document.get("labels"), [f"{len(curves)} edges were followed"] if curves else []
-    said += [f"most points are {max(labels, key=labels.__getitem__)}"] if labels else []
-    said = f"Over {x} and {y} {' and '.join(said) or 'no edge could be followed'}."
+    said = f"Over speed and {y}: {', '.join(said) or 'no edge could be followed'}."
     return Answer(said, tables, notes, document, subject, files)

@@ -5,16 +5,16 @@ import dataclasses
 import json
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import tyro
 
 import jaxcage as jc
 
-from .._errors import ArgumentError, InputError, NoResult
+from .._errors import InputError, NoResult
 from . import options as o
-from .answer import Answer, drawn
+from .answer import Answer
 from .progress import say
 from .subject import RPM, Subject, read_case
 from .values import read_vary
@@ -31,12 +31,12 @@ COMPARED = (
 """Variables that are compared, of those that a data set has."""
 RAMPED = ("size", "eccentricity", "cage_slip", "friction_power_W")
 """Variables of a ramp that are shown, of those that a data set has."""
-CHOSEN, ROWS = 5, 20
-"""Speeds shown in tables of a comparison where none are named, and windows of a ramp."""
+ROWS = 20
+"""Windows of a ramp that are shown, about."""
 MOST_POINTS = 30_000_000
 """Points of a study, each from several initial states: a week at a rate of 150 lanes a second."""
 ADVICE = "what is stored stays, and the same command goes on from there"
-AGAIN = "the same command without --check and --shard computes again what is damaged and leaves the rest"
+AGAIN = "the same command without --shard computes again what is damaged and leaves the rest"
 
 
 def simulate(
@@ -59,20 +59,15 @@ def simulate(
     if found.outcome not in ("successful", "inaccurate"):
         raise NoResult(f"The simulation at {where} failed ({found.outcome}): try more --steps, or another --solver.")
     title, measures = f"{subject.name}, {where}", jc.measures(model, found)
-    tables, document = [jc.show.measures_table(title, measures)], subject.both(at) | length
-    document |= {"outcome": found.outcome, "error": found.error, "measures": {n: m.value for n, m in measures.items()}}
-    if subject.with_rollers:
-        rollers = jc.analysis.rollers
-        history, orders = rollers.roller_history(model, found), rollers.bearing_orders(model, found)
-        around, spectra = rollers.around(history), rollers.bearing_spectra(history) if length["revolutions"] > 1 else {}
-        document |= {"around": around, "orders": orders, "force_shares": rollers.pocket_force_distribution(history)}
-        tables += [jc.show.circumference_table(around), *jc.show.line_tables(spectra, orders)]
-        figure = jc.show.bearing_figure(model, found, history, around, spectra, orders, title)
-        columns = jc.show.roller_columns(history)
+    document = subject.both(at) | length | {"outcome": found.outcome, "error": found.error}
+    document["measures"] = {name: each.value for name, each in measures.items()}
+    if (rollers := jc.show.rollers_of(model, found)) is None:
+        columns = jc.show.trajectory_columns(found, jc.analysis.cage_forces(model, found))
     else:
-        forces = jc.analysis.cage_forces(model, found)
-        figure = jc.show.simulation_figure(found, forces, float(model.clearance), title)
-        columns = jc.show.trajectory_columns(found, forces)
+        shares = jc.analysis.pocket_force_distribution(rollers.history)
+        document |= {"around": rollers.around, "orders": rollers.orders, "force_shares": shares}
+        columns = jc.show.roller_columns(rollers.history)
+    tables, figure = jc.show.run_tables(title, measures, rollers), jc.show.run_figure(model, found, rollers, title)
     said = ", ".join(f"{n.replace('_', ' ')} {measures[n].value:.4g}" for n in TOLD if n in measures)
     note = f"Error of a revolution: at most {found.error:.0e} of the scale ({found.outcome})"
     files = {"figure": (f"{stem}.png", figure), "data": (f"{stem}.csv", columns)}
@@ -107,9 +102,10 @@ def swept(subject: Subject, over: o.Range, run: o.SweepOptions, show: o.ShowOpti
     jc.show.require_some(found)
     zones, counts, title = zones_of(found), counted(found), f"{subject.name}, {jc.analysis.length(found)}"
     if short := int(np.sum(jc.analysis.too_short(found))):
-        say(f"Warning: {short} lanes have no certain label{jc.analysis.cure(found) or ': choose more --revolutions'}.")
+        cure = jc.analysis.cure(found) or ": choose more --revolutions"
+        say(f"Warning: {jc.show.counted(short, 'lane')} without a certain label{cure}.")
     if beyond := int(np.sum(found["peak"].values > 1)) * (not subject.with_rollers):
-        say(f"Warning: {beyond} lanes went beyond eps = 1, where the surfaces would overlap.")
+        say(f"Warning: {jc.show.counted(beyond, 'lane')} went beyond eps = 1, where the surfaces would overlap.")
     tables = zone_tables(subject, found, zones)
     if names := [n for n in SHOWN if n in found]:
         tables.append(jc.show.quantities_table(f"Means over initial states, {title}", found, [*names, "exponent"]))
@@ -149,7 +145,8 @@ def said_of(found: Any, zones: Any) -> str:
     if "strobe" not in found:
         chaotic = sum(zone.speeds for zone in zones if zone.chaotic)
         each = (f"{' or '.join(z.labels)} {z.low_rpm:.0f} to {z.high_rpm:.0f} rpm" for z in zones)
-        said = f"The largest exponent is positive beyond doubt at {chaotic} of {rpm.size} speeds {between}"
+        of = jc.show.counted(rpm.size, "speed")
+        said = f"The largest exponent is positive beyond doubt at {chaotic} of {of} {between}"
         return f"{said}; motion: {', '.join(each)}."
     lasts = f" that lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
     dies = f"; {len(zones.transient)} of chaos that dies out" if zones.transient else ""
@@ -167,7 +164,7 @@ def chances(subject: Subject, over: o.Range, draws: int, seed: int, run: o.RunOp
     chance = found.rpm, found.chance, found.interval, bands
     columns = {f"{key.replace('_rpm', '').replace('_', ' ')} [rpm]": x for key, x in subject.both(found.speed).items()}
     columns |= dict(zip(("chance of chaos", "lower", "upper"), (found.chance, *found.interval), strict=True))
-    figure = drawn(title, lambda ax: jc.show.chance_of_chaos(*chance, ax))
+    figure = jc.show.drawn(lambda ax: jc.show.chance_of_chaos(*chance, ax), title=title)
     tables, notes = jc.show.chances_tables(subject.name, found, subject.beside), jc.show.chances_notes(found)
     document, files = jc.show.chances_document(found), {"figure": (".png", figure), "data": (".csv", columns)}
     return Answer(jc.show.chances_answer(found), tables, notes, document, subject.certain, files)
@@ -206,7 +203,8 @@ def poincare(
     exponent = jc.show.Column("largest exponent per revolution", (), key="exponents", errors="standard_error")
     columns = [jc.show.Column("start", ()), jc.show.Column("label", ()), exponent]
     names = [f"start {row['start']}: {row['label']}" for row in starts]
-    figure = drawn(where, lambda ax: jc.show.strobe_section(found["strobe"].values[0], ax, names=names), 6.5, 5.4)
+    draw = lambda ax: jc.show.strobe_section(found["strobe"].values[0], ax, names=names)
+    figure = jc.show.drawn(draw, 6.5, 5.4, where)
     files = {"figure": (f"{stem}.png", figure), "data": (f"{stem}.csv", jc.show.strobe_columns(found))}
     table = jc.show.rows_table(f"Strobe section of {where}, {jc.analysis.length(found)}", starts, columns, "starts")
     said = f"At {subject.at(at)} the motion is {' or '.join(counted(found))}."
@@ -218,7 +216,6 @@ def compare(
     other: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="OTHER")],
     *,
     over: o.Range = o.Range(),
-    at: str = "",
     run: o.SweepOptions = o.SweepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
@@ -226,7 +223,6 @@ def compare(
 
     Args:
         other: The design to compare it with, a case or a TOML file.
-        at: Speeds shown in tables, e.g. "8500, 12000" [rpm] or "20000 rpm shaft"; five of the range if left out.
     """
     one, two = read_case(case), read_case(other)
     if one.with_rollers != two.with_rollers:
@@ -234,15 +230,8 @@ def compare(
         raise InputError(f"Case '{other}' must be {kind}, as the first one is: two of a kind are compared.")
     pair = [one, dataclasses.replace(two, name=f"{two.name}_second") if two.name == one.name else two]
     names, times = [each.name for each in pair], 1.0 if one.shaft is None else one.shaft / (two.shaft or 1.0)
-    try:
-        wanted = [one.speed(o.read_quantity(x.strip(), "rpm"), "at") for x in at.split(",") if x.strip()]
-    except ValueError as error:
-        raise error if isinstance(error, InputError) else ArgumentError("at", said=str(error)) from error
-    speeds = np.unique([*one.range(over, one.usual(126, 13)), *wanted])
-    if wanted and not one.range(over, 2)[0] <= min(wanted) <= max(wanted) <= one.range(over, 2)[-1]:
-        raise InputError(f"Option --at must lie between --first and --last, but '{at}' was given.")
-    places = np.searchsorted(speeds, wanted) if wanted else np.linspace(0, speeds.size - 1, CHOSEN).round().astype(int)
-    two.speed(o.read_quantity(f"{speeds[-1] * times * RPM} rpm {two.own}", "rpm"), "last")
+    speeds = one.range(over, one.usual(126, 13))
+    two.speed(speeds[-1] * times * RPM, "last", two.own)
     found, rows, said, tables, designs = [], [], [], [], {}
     with show.computing(f"compare {names[0]}") as progress:
         for each, factor in zip(pair, (1.0, times), strict=True):
@@ -253,25 +242,22 @@ def compare(
     for each, data in zip(pair, found, strict=True):
         means = {n: jc.show.mean_over_starts(data, n) for n in quantities}
         designs[each.name] = {"labels": data["label"].values, **each.both(data["speed"].values)}
-        designs[each.name] |= {n: mean for n, (mean, _) in means.items()} | {
-            f"{n}_error": e for n, (_, e) in means.items()
-        }
+        for name, (mean, error) in means.items():
+            designs[each.name] |= {name: mean, f"{name}_error": error}
         rows.append({"design": each.name, **{n: float(np.nanmean(mean)) for n, (mean, _) in means.items()}})
         said.append(f"{each.name}: {said_of(data, zones_of(data))}")
         tables += [dataclasses.replace(table, key="") for table in zone_tables(each, data, zones_of(data))]
     transposed = [{"measure": n.replace("_", " "), **{row["design"]: row[n] for row in rows}} for n in quantities]
     columns = [jc.show.Column(n, ()) for n in ("measure", *names)]
-    chosen, zones = [data.isel(speed=np.unique(places)) for data in found], [zones_of(data) for data in found]
     tables = [
         jc.show.rows_table("Means over speed, in SI units", transposed, columns, "means"),
         jc.show.differences_table(names, [each.model for each in pair]),
-        *(jc.show.quantity_beside(n, names, chosen) for n in quantities),
         *tables,
     ]
-    files = {"figure": (f"_{names[1]}.png", jc.show.sweeps_beside(names, found, zones))}
+    figure = jc.show.sweeps_beside(names, found, [zones_of(data) for data in found])
+    files = {"figure": (f"_{names[1]}.png", figure)}
     files["measures"] = f"_{names[1]}_measures.png", jc.show.quantities_beside(names, found, quantities[1:])
-    note = "Means over initial states, with standard errors; * where both differ by more than two of them."
-    return Answer(" ".join(said), tables, [note], {"cases": names, "designs": designs}, one, files)
+    return Answer(" ".join(said), tables, [], {"cases": names, "designs": designs}, one, files)
 
 
 def _measured(subject: Subject, found: Any) -> Any:
@@ -300,7 +286,7 @@ def runup(
 
     Args:
         rate: Speed gained per second [rpm/s], in the mean over the ramp, of the speed that bare numbers are.
-        windows: Parts into which each ramp is cut, in each of which the motion is read.
+        windows: Parts into which each ramp is cut at least; each has an even number of revolutions.
         discard: Revolutions at the first speed before the ramp begins.
     """
     subject = read_case(case, load)
@@ -328,7 +314,7 @@ def runup(
     title = f"Run-up and run-down of {subject.name}, {rate:g} rpm/s, {found.attrs['revolutions']} revolutions each"
     document = {"rate_rpm_per_s": rate, "hysteresis_rpm": spans, "ramp_seconds": found.attrs["seconds"]}
     document |= {way: {n: x[n].values for n in ("rpm", *x.data_vars)} for way, x in ways.items()}
-    figure = jc.show.ramp_figure(ways["up"], ways["down"], names, spans, title)
+    figure = jc.show.quantities_beside(("run-up", "run-down"), [*ways.values()], names, spans, title)
     files = {"figure": (".png", figure), "data": (".csv", data | {"differs": differs})}
     return Answer(said, [jc.show.Table(title, columns)], [], document, subject, files)
 
@@ -341,14 +327,8 @@ def study(
     seed: o.Seed = 0,
     starts: o.OptionalCount = None,
     exponents: o.OptionalCount = None,
-    strobe: o.FromZero = 0,
-    store: Annotated[str | None, o.text("name a folder within --out", o.is_within)] = None,
     chunk: o.OptionalCount = None,
-    shard: o.Shard = (1, 1),
-    executor: Literal["local", "dask"] = "local",
-    scheduler: o.OptionalText = None,
-    workers: o.OptionalCount = None,
-    check: bool = False,
+    shard: o.Shard = None,
     run: o.RunOptions = o.RunOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
@@ -356,31 +336,20 @@ def study(
 
     Args:
         vary: Once for each parameter, `speed` among them. A grid: speed=4000rpm:27500rpm:100, or single values:
-            oil=32,56,78 (ISO VG grades). Sampled: guidance_gap=0.3mm:0.6mm, or in a tolerance: eccentricity=20um+-3um.
+            oil=32,56,78 (ISO VG grades). Sampled: guidance_gap=0.3mm:0.6mm, or in a tolerance: eccentricity=20um±3um.
         sample: Number of samples, best a power of 2.
         starts: Initial states at each point; all of the model's own if left out.
         exponents: Number of Lyapunov exponents.
-        strobe: Strobe states stored of each lane, the last ones.
-        store: Name of the store within the output folder.
         chunk: Lanes computed and stored together.
         shard: Part of the work, e.g. 2/4: every fourth chunk from the second on. All parts write to the same store.
-        executor: Where to run: on all cores of this machine, or on dask.distributed.
-        scheduler: Address of a dask scheduler, e.g. tcp://host:8786; a cluster on this machine if left out.
-        workers: Processes of the cluster on this machine; one a core if left out.
-        check: Compute nothing: compare every chunk of the store with its checksum.
     """
     subject = read_case(case)
-    path = Path(show.out) / (store or f"study_{subject.name}.zarr")
-    if check:
-        return _checked(subject, path)
-    if executor == "local" and (scheduler is not None or workers is not None):
-        raise InputError("Options --scheduler and --workers go with --executor dask.")
+    path = Path(show.out) / f"study_{subject.name}.zarr"
     given, done = read_vary(vary, subject), []
     if np.prod([max(sample, 1.0), *(float(x.size) for x in given.values() if isinstance(x, np.ndarray))]) > MOST_POINTS:
         raise InputError(f"Options --vary and --sample must make at most {MOST_POINTS} points to run lanes at.")
-    settings: dict[str, Any] = {"samples": sample, "seed": seed, "starts": starts, "strobe": strobe, "lanes": chunk}
-    settings |= {"shard": shard, "executor": executor, "scheduler": scheduler, "workers": workers, **run.settings}
-    settings |= {} if exponents is None else {"exponents": exponents}
+    settings: dict[str, Any] = {"samples": sample, "seed": seed, "starts": starts, "lanes": chunk}
+    settings |= {"shard": shard or (1, 1)} | run.settings | ({} if exponents is None else {"exponents": exponents})
     with show.computing(f"study {subject.name}", ADVICE) as bar:
 
         def report(so_far: int, total: int) -> None:
@@ -391,8 +360,6 @@ def study(
             with jc.study(subject.model, given, store=path, progress=report, **settings) as stored:
                 names = [str(name) for name, x in stored.data_vars.items() if x.dims == stored["label"].dims]
                 found = stored[names].load()
-        except ImportError as error:  # of an extra
-            raise InputError(str(error)) from error
         except ValueError as error:  # a chunk that another shard has written
             if isinstance(error, InputError):
                 raise
@@ -400,7 +367,7 @@ def study(
     dims, counts, size = found["label"].dims, counted(found), found["label"].size
     left, lanes = counts.pop("pending", 0), found.stack(lane=dims)
     if left:
-        say(f"Warning: {left} lanes are left for the other shards.")
+        say(f"Warning: {jc.show.counted(left, 'lane')} left for the other shards.")
     jc.show.require_some(lanes.isel(lane=np.flatnonzero(lanes["label"].values != "pending")))
     document = {"axes": dict(zip(dims, found["label"].shape, strict=True)), "lanes": size, "labels": counts}
     document |= {"stored": size - left, "stored_before": size - left - done[-1] + done[0]}
@@ -411,16 +378,3 @@ def study(
     notes = [f"Open it: jaxcage.open_study({str(path)!r})"]
     tables = [jc.show.shares_table(f"Lanes: {shape}", "label", counts)]
     return Answer(said, tables, notes, document, subject, stored={"store": str(path)})
-
-
-def _checked(subject: Subject, path: Path) -> Answer:
-    """The chunks of a store compared with their checksums."""
-    try:
-        state = jc.lanes.check_study(path)
-    except FileNotFoundError as error:
-        raise InputError(str(error)) from error
-    damaged = {str(chunk): what for chunk, what in state.damaged.items()}
-    document = {"store": str(path), "chunks": state.chunks, "finished": state.finished, "damaged": damaged}
-    said, *notes = str(state).splitlines()
-    failure = f"The store '{path}' is damaged: {AGAIN}." if damaged else ""
-    return Answer(said, [], notes, document, subject, failure=failure)

@@ -86,26 +86,24 @@ class Subject:
         slope = 1.0 if self.speeds == self.own else float(self._other(1.0) - self._other(0.0))
         return given / slope / RPM
 
-    def speed(self, given: float | None, option: str = "speed") -> float:
-        """The speed of the model [rad/s] that an option means."""
-        return jc.rpm(self._rpm(given, option))
+    def speed(self, given: float | None, option: str = "speed", whose: Any = None) -> float:
+        """The speed of the model [rad/s] that an option means; `whose` owns bare numbers in place of the usual."""
+        return jc.rpm(self._rpm(given, option, whose or self.speeds))
 
-    def _rpm(self, given: float | None, option: str) -> float:
-        """The speed of the model [rpm] that an option means, by the model's own relation of cage and shaft.
+    def _rpm(self, given: float | None, option: str, whose: Any) -> float:
+        """The speed of the model [rpm] that an option means.
 
         **Raises:** `InputError` for no speed, and for one at which no cage runs.
         """
         if given is None:
             raise InputError(f'Option {flag(option)} must be given, e.g. {flag(option)} "10000 rpm shaft".')
-        speed = float(given)
-        if getattr(given, "whose", self.speeds) != self.own:
+        speed = jc.files.own_rpm(self.model, given, whose)
+        if self.own == "shaft" and speed <= 0:
             at_rest = float(self._other(0.0))
-            speed = (speed - at_rest) / (float(self._other(1.0)) - at_rest)
-            if speed <= 0:
-                raise InputError(
-                    f"Option {flag(option)} must be above {at_rest:g} rpm of the cage, which the outer ring makes by "
-                    f"itself, but {float(given):g} rpm was given."
-                )
+            raise InputError(
+                f"Option {flag(option)} must be above {at_rest:g} rpm of the cage, which the outer ring makes by "
+                f"itself, but {float(given):g} rpm was given."
+            )
         cage = speed if self.own == "cage" else abs(float(self._other(speed)))
         limit = jc.models.FASTEST / float(self.model.land_radius) * RPM
         if not 0 < speed or not cage <= limit:
@@ -121,8 +119,10 @@ class Subject:
 
         **Raises:** `InputError` for a range that does not ascend.
         """
-        low, high, count = self._rpm(over.first, "first"), self._rpm(over.last, "last"), over.count or count
-        if count > 1 and high <= low:
+        low, high = (
+            self._rpm(end, option, self.speeds) for option, end in (("first", over.first), ("last", over.last))
+        )
+        if (count := over.count or count) > 1 and high <= low:
             between = f"{low:g} to {high:g} rpm of the {self.own}"
             raise InputError(f"Option --last must be above --first, but the range is {between}.")
         return jc.rpm(low, high, count)

@@ -15,7 +15,7 @@ from .subject import Subject
 
 
 SPEED, OIL = "speed", "oil"
-FORMS = "values such as 4000rpm:27500rpm:100, 0.3mm:0.6mm, 20um+-3um or 32,56,78"
+FORMS = "values such as 4000rpm:27500rpm:100, 0.3mm:0.6mm, 20um±3um or 32,56,78"
 MOST_CORNERS = 256
 """Combinations of smallest and largest values that are checked beforehand."""
 USUAL = {"guidance_gap": (0.7, 1.4), "eccentricity": (0.2, 2.5)}
@@ -116,7 +116,7 @@ def read_each(option: str, given: Sequence[str], form: str, read: Callable[[str,
 
 
 def _read(name: str, text: str, subject: Subject) -> Any:
-    info, parts = jc.parameter_info(subject.model), text.split(":")
+    info, parts, tolerance = jc.parameter_info(subject.model), text.split(":"), text.replace("+-", "±").split("±", 1)
     if name not in (names := [SPEED, OIL, *info]):
         raise InputError(f"Option --vary must name one of {', '.join(names)}, but names '{name}'.")
 
@@ -125,19 +125,18 @@ def _read(name: str, text: str, subject: Subject) -> Any:
             return subject.speed(read_quantity(part.strip(), "rpm"), "vary")
         return jc.files.to_si(part, info[name].unit if name in info else "1")
 
-    if "+-" in text or "±" in text:
-        return jc.lanes.Tolerance(*map(number, text.replace("±", "+-").split("+-", 1)))
+    if len(tolerance) == 2:
+        return jc.lanes.Tolerance(*map(number, tolerance))
     if len(parts) == 2:
         return jc.lanes.Between(*map(number, parts))
     if len(parts) == 3 and not (parts[2].strip().isdecimal() and 1 <= int(parts[2]) <= MOST):
         raise ValueError(f"must have a number of values from 1 to {MOST} at its end, but has '{parts[2]}'.")
     if len(parts) > 3:
         raise ValueError(f"must have {FORMS}, but '{text}' was given.")
-    given = text.split(",")
-    spaced = len(parts) == 3
-    found = (
-        np.linspace(number(parts[0]), number(parts[1]), int(parts[2])) if spaced else np.array([*map(number, given)])
-    )
+    if len(parts) == 3:
+        found = np.linspace(number(parts[0]), number(parts[1]), int(parts[2]))
+    else:
+        found = np.array([*map(number, text.split(","))])
     if np.unique(found).size < found.size or not np.all(np.isfinite(found)):
         raise ValueError(f"must have distinct values, but '{text}' was given.")
     return found
@@ -147,12 +146,11 @@ def _check_corners(vary: dict[str, Any], subject: Subject) -> None:
     """Check the smallest and largest values of all that is varied, and that they go together."""
     ends = {name: (how.min(), how.max()) if isinstance(how, np.ndarray) else how.bounds for name, how in vary.items()}
     ends.pop(SPEED, None)
-    for values in itertools.islice(itertools.product(*(sorted(set(pair)) for pair in ends.values())), MOST_CORNERS):
-        corner = dict(zip(ends, map(float, values), strict=True))
-        oil = {name: corner.pop(name) for name in [OIL] if name in corner}
+    for values in itertools.islice(itertools.product(*ends.values()), MOST_CORNERS):
         try:
+            corner = {name: float(value) for name, value in zip(ends, values, strict=True)}
+            oil = {OIL: corner.pop(OIL)} if OIL in corner else {}
             jc.files.check_together(jc.replace(jc.lanes.with_values(subject.model, oil), **corner))
-        except ArgumentError as error:
-            raise InputError(error.about("Option --vary", str)) from error
         except ValueError as error:
-            raise InputError(f"Option --vary: {error}") from error
+            said = error.about("Option --vary", str) if isinstance(error, ArgumentError) else f"Option --vary: {error}"
+            raise InputError(said) from error

@@ -33,20 +33,15 @@ OK, FAILED, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
 FUNCTIONS: tuple[Callable[..., Answer], ...] = (
     *(case.init, speed.simulate, speed.sweep, orbit.zones, orbit.bifurcations, orbit.gradient, speed.compare),
-    *(speed.runup, orbit.map_, speed.study, design.design, design.sensitivity, design.unknowns, design.identify),
-    *(speed.poincare, case.statics, case.impact, case.reproduce, case.report),
+    *(speed.runup, orbit.map_, speed.study, design.design, design.sensitivity, design.identify),
+    *(speed.poincare, case.statics, case.report),
 )
 COMMANDS = {function.__name__.rstrip("_"): function for function in FUNCTIONS}
 COMPLETION, SHELLS = ("--tyro-print-completion", "--tyro-write-completion"), ("bash", "zsh", "tcsh", "fish")
 """Options that tyro takes by itself, and the values that it asserts."""
 CALLED = {"directions": "by", "lanes": "chunk", "samples": "sample", "settle": "discard", "confirm": "no_confirm"}
-CALLED |= {
-    "method": "solver",
-    "centrifugal_force": "shaft_speed",
-    "blocks": "revolutions",
-    "x": "points",
-    "y": "points",
-}
+CALLED |= {"method": "solver", "centrifugal_force": "shaft_speed", "blocks": "revolutions", "store": "out"}
+CALLED |= {"x": "points", "y": "points"}
 """Argument of the library -> option that it comes from, where no option has its name."""
 
 

@@ -39,6 +39,8 @@ from .speeds import (
     SpeedOf as SpeedOf,
     Whose as Whose,
     cage_rpm as cage_rpm,
+    own_rpm as own_rpm,
+    read_rpm as read_rpm,
     shaft_rpm as shaft_rpm,
     split_owner as split_owner,
 )

@@ -1,9 +1,10 @@
 """Speeds of the cage, used inside the library, and of the shaft, as users know them."""
 
+import math
 import re
-from typing import Literal
+from typing import Any, Literal
 
-from .units import printable
+from .units import printable, to_si
 
 
 Whose = Literal["cage", "shaft"]
@@ -45,3 +46,25 @@ def shaft_rpm(value: float, unsaid: Whose, cage_speed_ratio: float) -> float:
 
 def _whose(value: float, unsaid: Whose) -> Whose:
     return value.whose if isinstance(value, SpeedOf) else unsaid
+
+
+def own_rpm(model: Any, value: float, unsaid: Whose | None = None) -> float:
+    """The speed of a model [rpm] that `value` means, by the model's own relation of cage and shaft.
+
+    `unsaid` owns a value that does not name its owner; None takes the model's own speed.
+    """
+    own = model.speed_text.split()[0]
+    if _whose(value, unsaid or own) == own:
+        return float(value)
+    at_rest, at_one = (float(model.other_speed(speed)[1]) for speed in (0.0, 1.0))
+    return (float(value) - at_rest * 30 / math.pi) / (at_one - at_rest)
+
+
+def read_rpm(text: str) -> float:
+    """A speed [rpm] from a text such as `900 rad/s` or `20000 rpm shaft`, with its owner if the text names one.
+
+    **Raises:** `ValueError` with half a sentence.
+    """
+    speed, whose = split_owner(text)
+    value = to_si(speed, "rpm")
+    return value if whose is None else SpeedOf(value, whose)

@@ -4,58 +4,39 @@
 |-------------------|-----------------------------------------------------------------------|
 | `tables`          | columns of numbers with units                                         |
 | `columns`         | time histories, strobe points and branches as CSV                     |
-| `style`           | colours, frames, legends; light, dark and print style                 |
-| `speed_axes`      | axes of speed: shaft speed, zones, published edges, operating speeds  |
-| `diagrams`        | sweeps over speed: orbit diagram, exponents, quantities; comparisons  |
-| `history_figures` | one trajectory and its strobe section                                 |
+| `style`           | colours, frames, legends, figures, axes                               |
+| `diagrams`        | sweeps over speed: orbits, exponents, quantities, zones; comparisons  |
+| `run_figures`     | one run of a cage or of a bearing with its rollers, roller loads      |
 | `orbit_figures`   | branches of periodic orbits, Floquet multipliers                      |
-| `maps`            | bifurcation curves, exponents and labels over two parameters          |
-| `bearing_figures` | drawing of the whole bearing, slips, spectra, statics                 |
+| `maps`            | bifurcation curves, exponents and labels over speed and a parameter   |
 | `design_figures`  | elasticities, searches for better designs, chances of chaos           |
-| `sources`         | parameters with their sources                                         |
-| `operating`       | operating speeds compared with zones                                  |
-| `reproduction`    | the paper's edges, conclusions and diagrams beside the model's        |
-| `findings`        | everything that a report shows, computed                              |
-| `sections`        | sections of the report                                                |
-| `checks`          | tables of checks and settings for the report                          |
-| `zone_tables`     | zones found in a sweep or by a search                                 |
-| `orbit_tables`    | bifurcations, stable stretches, zones without a synchronous orbit     |
+| `zone_tables`     | zones found in a sweep or by a search, bifurcations, stable stretches |
 | `gradient_tables` | derivatives of edges, of lasting chaos, of means                      |
 | `quantity_tables` | quantities over speed and of one run, statics, two designs compared   |
 | `design_tables`   | designs before and after a search, shares of variance, tolerances     |
 | `chance_tables`   | chances of chaos, ranges that measurements narrowed                   |
-| `parameter_axes`  | axes of a stability map, bifurcations followed over them              |
-| `page`            | the report as HTML                                                    |
+| `sources`         | parameters with their sources                                         |
+| `findings`        | everything that a report shows, computed; operating speeds and zones  |
+| `report`          | the report as HTML, made of sections                                  |
 """
 
-from .bearing_figures import (
-    bearing_drawing as bearing_drawing,
-    bearing_figure as bearing_figure,
-    impact_forces as impact_forces,
-    load_bars as load_bars,
-)
 from .chance_tables import (
     chances_answer as chances_answer,
     chances_document as chances_document,
     chances_notes as chances_notes,
     chances_tables as chances_tables,
     measured_table as measured_table,
-    measures_words as measures_words,
     narrowed_table as narrowed_table,
-    operating_chances as operating_chances,
-    range_words as range_words,
 )
 from .columns import (
     branch_columns as branch_columns,
     curve_columns as curve_columns,
-    read_columns as read_columns,
     roller_columns as roller_columns,
     strobe_columns as strobe_columns,
     trajectory_columns as trajectory_columns,
     write_columns as write_columns,
 )
 from .design_figures import (
-    EDGE_COLOURS as EDGE_COLOURS,
     chance_of_chaos as chance_of_chaos,
     design_figure as design_figure,
     elasticity_bars as elasticity_bars,
@@ -70,15 +51,22 @@ from .design_tables import (
     sobol_table as sobol_table,
 )
 from .diagrams import (
+    add_shaft_axes as add_shaft_axes,
     exponent_strip as exponent_strip,
+    mark_published as mark_published,
     orbit_diagram as orbit_diagram,
+    published_edges as published_edges,
     quantities_beside as quantities_beside,
-    quantity_over_speed as quantity_over_speed,
-    ramp_figure as ramp_figure,
     sweep_figure as sweep_figure,
     sweeps_beside as sweeps_beside,
 )
-from .findings import AllFailed as AllFailed, Findings as Findings, examine as examine, require_some as require_some
+from .findings import (
+    Findings as Findings,
+    Operating as Operating,
+    examine as examine,
+    read_operating as read_operating,
+    require_some as require_some,
+)
 from .gradient_tables import (
     FIRST as FIRST,
     edge_slopes as edge_slopes,
@@ -88,98 +76,59 @@ from .gradient_tables import (
     mean_gradient_tables as mean_gradient_tables,
     missing_notes as missing_notes,
     not_fixed as not_fixed,
-    slope_record as slope_record,
     source_notes as source_notes,
     to_be_turned as to_be_turned,
     width_table as width_table,
 )
-from .history_figures import (
-    START_COLOURS as START_COLOURS,
-    orbit as orbit,
-    simulation_figure as simulation_figure,
-    strobe_section as strobe_section,
-    time_history as time_history,
-)
-from .maps import map_figure as map_figure, stability_map as stability_map, top_exponent as top_exponent
-from .operating import Operating as Operating, Verdict as Verdict, read_operating as read_operating
-from .orbit_figures import (
-    MARKS as MARKS,
-    PERIOD_COLOURS as PERIOD_COLOURS,
-    branch_diagram as branch_diagram,
-    multiplier_circle as multiplier_circle,
-    orbit_diagram_with_branches as orbit_diagram_with_branches,
-)
-from .orbit_tables import (
-    coexisting_notes as coexisting_notes,
-    contact_notes as contact_notes,
-    edge_table as edge_table,
-    loss_table as loss_table,
-    orbits_document as orbits_document,
-    point_record as point_record,
-    stretch_table as stretch_table,
-    unsettled_notes as unsettled_notes,
-)
-from .page import page as page
-from .parameter_axes import (
-    SPEED as SPEED,
+from .maps import (
     Axis as Axis,
     curves_table as curves_table,
     follow_edges as follow_edges,
+    map_figure as map_figure,
     parameter_axis as parameter_axis,
+    stability_map as stability_map,
+    top_exponent as top_exponent,
+)
+from .orbit_figures import (
+    multiplier_circle as multiplier_circle,
+    orbit_diagram_with_branches as orbit_diagram_with_branches,
 )
 from .quantity_tables import (
-    circumference_table as circumference_table,
     differences as differences,
     differences_table as differences_table,
     displacements as displacements,
     head_of as head_of,
-    impact_table as impact_table,
-    line_tables as line_tables,
     mean_over_starts as mean_over_starts,
-    measures_table as measures_table,
     quantities_table as quantities_table,
-    quantity_beside as quantity_beside,
+    run_tables as run_tables,
     statics_table as statics_table,
-    unit_of as unit_of,
 )
-from .sections import Section as Section, assess as assess, verdict_table as verdict_table
-from .sources import readings_words as readings_words, sources_table as sources_table
-from .speed_axes import (
-    add_shaft_axes as add_shaft_axes,
-    mark_operating as mark_operating,
-    mark_published as mark_published,
-    published_edges as published_edges,
-    shade_zones as shade_zones,
-    zone_strip as zone_strip,
+from .report import assess as assess, page as page, verdict_table as verdict_table
+from .run_figures import (
+    load_bars as load_bars,
+    rollers_of as rollers_of,
+    run_figure as run_figure,
+    strobe_section as strobe_section,
 )
-from .style import (
-    FORCE_COLOURS as FORCE_COLOURS,
-    KIND_COLOURS as KIND_COLOURS,
-    MOTION_COLOURS as MOTION_COLOURS,
-    OWN_COLOURS as OWN_COLOURS,
-    STYLES as STYLES,
-    Style as Style,
-    new_figure as new_figure,
-    restyle as restyle,
-)
+from .sources import readings_words as readings_words
+from .style import drawn as drawn, new_figure as new_figure
 from .tables import (
     Column as Column,
-    Scaled as Scaled,
     Table as Table,
-    chosen as chosen,
-    number as number,
+    counted as counted,
     rows_table as rows_table,
     shares_table as shares_table,
-    speed_columns as speed_columns,
-    value_table as value_table,
 )
 from .zone_tables import (
-    beside_published as beside_published,
-    published_zones as published_zones,
+    coexisting_notes as coexisting_notes,
+    edge_table as edge_table,
+    loss_table as loss_table,
+    orbits_document as orbits_document,
+    stretch_table as stretch_table,
     stretches_table as stretches_table,
     transient_tables as transient_tables,
+    unsettled_notes as unsettled_notes,
     zone_details as zone_details,
-    zone_record as zone_record,
     zone_span as zone_span,
     zone_words as zone_words,
     zones_table as zones_table,

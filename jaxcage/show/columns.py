@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Float, Shaped
 
-from ..files import read_bytes, replacing
+from ..files import replacing
 from ..quantities import component_names, quantity
 from ..solve import Trajectory
 
@@ -16,11 +16,7 @@ from ..solve import Trajectory
 if TYPE_CHECKING:
     from ..analysis import RollerHistory
     from ..orbits import Branch, Curve
-    from .parameter_axes import Axis
-
-
-LARGEST_TABLE = 4_000_000_000
-"""Bytes of a table that is read."""
+    from .maps import Axis
 
 
 def write_columns(path: str | Path, columns: Mapping[str, Shaped[np.ndarray, " rows"]]) -> Path:
@@ -29,17 +25,6 @@ def write_columns(path: str | Path, columns: Mapping[str, Shaped[np.ndarray, " r
     with replacing(path) as temporary:
         np.savetxt(temporary, table, fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
     return Path(path)
-
-
-def read_columns(path: str | Path) -> dict[str, Float[np.ndarray, " rows"]]:
-    """The columns of a file that `write_columns` wrote, by their heads.
-
-    **Raises:** `ValueError` for what is no table of numbers with a head over each column.
-    """
-    head, *rows = read_bytes(path, LARGEST_TABLE).decode().splitlines()
-    names = head.strip().split(",")
-    table = np.loadtxt(rows, delimiter=",", ndmin=2)
-    return dict(zip(names, table.T, strict=True))
 
 
 def trajectory_columns(
@@ -92,9 +77,10 @@ def roller_columns(history: "RollerHistory") -> dict[str, Shaped[np.ndarray, " s
     return columns
 
 
-def curve_columns(curves: Sequence["Curve"], x: "Axis", y: "Axis") -> dict[str, Shaped[np.ndarray, " points"]]:
-    """Points of curves in two parameters, in the units in which these are shown."""
+def curve_columns(curves: Sequence["Curve"], axis: "Axis") -> dict[str, Shaped[np.ndarray, " points"]]:
+    """Points of curves over speed and a parameter, in the units in which these are shown."""
     joined = lambda rows: np.concatenate([np.asarray(row) for row in rows])
     columns = {"curve": joined(np.full(c.x_value.size, i) for i, c in enumerate(curves, start=1))}
-    columns |= {x.head: x.shown(joined(c.x_value for c in curves)), y.head: y.shown(joined(c.y_value for c in curves))}
+    columns["speed [rpm]"] = joined(c.x_value for c in curves) * 30 / np.pi
+    columns[axis.head] = axis.shown(joined(c.y_value for c in curves))
     return columns | {"genuine": joined(c.genuine for c in curves)}

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 
 from .._errors import ArgumentError
 from ..orbits import Sensitivity
-from .diagrams import draw_beside
-from .speed_axes import label_speed
+from .diagrams import draw_beside, label_speed
 from .style import (
     BAND,
     BLACK,

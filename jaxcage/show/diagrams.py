@@ -1,4 +1,4 @@
-"""Sweeps over speed: orbit diagram, exponents, reported quantities, one sweep or several beside each other.
+"""Sweeps over speed: orbit diagram, exponents, quantities, one sweep or several; axes of speed and what is marked.
 
 Every figure reads the data set of a sweep, its units and its coordinates, whatever model was swept.
 """
@@ -12,36 +12,177 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import StrMethodFormatter
+from matplotlib.transforms import offset_copy
 
-from ..analysis import CHAOS_THRESHOLD, Stretch, Zones, failed, scatter
+from ..analysis import CHAOS_THRESHOLD, Stretch, Zone, Zones, failed
 from ..bearing import PublishedCase
 from ..quantities import quantity
+from . import style
 from .quantity_tables import SHARES, head_of, mean_over_starts
-from .speed_axes import Span, add_shaft_axes, label_speed, mark_published, shade_zones, speed_limits
-from .style import (
-    BLACK,
-    BLUE,
-    GREY,
-    KIND_COLOURS,
-    LINE_COLOURS,
-    SKY,
-    VERMILION,
-    ZONE,
-    axes_or_new,
-    dots,
-    dress,
-    entitled,
-    legend_below,
-    new_figure,
-    padded_limits,
-)
 from .tables import SHOWN, factor
+from .zone_tables import published_zones, zone_span
+
+
+Span = tuple[float, float]
+"""Lowest and highest speed [rpm]."""
+CAGE, SHAFT = "Cage speed $n$ [rpm]", "Shaft speed [rpm]"
+BELOW = 36.0
+"""Distance of the axis of the other speed from that of the speed [points]."""
+
+
+def label_speed(ax: Axes, speed: xr.Dataset | str = "cage speed") -> Axes:
+    """Name the speed axis in revolutions per minute: the speed of a sweep, or the words for a model's."""
+    text = speed if isinstance(speed, str) else speed["rpm"].attrs.get("long_name", "speed")
+    names = {"cage speed": CAGE, "shaft speed": SHAFT}
+    ax.set_xlabel(names.get(text, f"{text[:1].upper()}{text[1:]} [rpm]"))
+    ax.xaxis.set_major_formatter(StrMethodFormatter("{x:.0f}"))
+    return ax
+
+
+def speed_limits(sweep: xr.Dataset) -> Span:
+    """First and last speed [rpm] of a sweep; 50 rpm around a single one."""
+    first, last = float(sweep["rpm"][0]), float(sweep["rpm"][-1])
+    return (first, last) if last > first else (first - 50, first + 50)
+
+
+def add_shaft_axes(figure: Figure, speeds: xr.Dataset | float, axes: Sequence[Axes] | None = None) -> Figure:
+    """Add a second axis beneath every axis of the cage speed, for the speed of the shaft.
+
+    **Arguments:** figure; a sweep, whose coordinates include both speeds, or the cage speed over the shaft speed; axes
+    of the figure, by default all.
+
+    **Returns:** the same figure. A sweep over another speed, and axes that have their second axis, stay as they are.
+    """
+    if isinstance(speeds, xr.Dataset):
+        if "shaft_rpm" not in speeds.coords:
+            return figure
+        cage, shaft = speeds["rpm"].values, speeds["shaft_rpm"].values
+        ratio = float(cage[-1] / shaft[-1])
+    else:
+        ratio = speeds
+    for ax in figure.axes if axes is None else axes:
+        if ax.get_xlabel() == CAGE and not any(child.get_xlabel() == SHAFT for child in ax.child_axes):
+            _add_below(ax, ratio)
+    return figure
+
+
+def _add_below(ax: Axes, ratio: float) -> None:
+    move = lambda points: offset_copy(ax.transAxes, ax.figure, y=-points, units="points")  # pyright: ignore
+    shaft = ax.secondary_xaxis(
+        0.0, functions=(lambda x: np.asarray(x) / ratio, lambda x: np.asarray(x) * ratio), transform=move(BELOW)
+    )
+    shaft.set_xlabel(SHAFT)
+    shaft.xaxis.set_major_formatter(StrMethodFormatter("{x:.0f}"))
+    shaft.tick_params(color=style.GREY, labelsize=9)
+    shaft.spines["bottom"].set(color=style.GREY, linewidth=0.8)
+    legend = ax.get_legend()
+    if legend is not None and legend.get_bbox_to_anchor().y1 < ax.get_window_extent().y0:  # it was beneath already
+        legend.set_loc("upper center")
+        legend.set_bbox_to_anchor((0.5, 0.0), transform=move(2 * BELOW))
+
+
+def shade_zones(ax: Axes, zones: Zones | Sequence[Stretch]) -> Axes:
+    """Shade the chaotic zones, an open one to the end of the axis; or stretches of speed by the motion of the cage."""
+    low, high = ax.get_xlim()
+    if isinstance(zones, Zones):
+        shaded = [("chaotic zone", style.ZONE, 1.0, span) for span in (zone_span(z, low, high) for z in zones.zones)]
+    else:
+        colour_of = lambda labels: style.MOTION_COLOURS.get("".join(labels), style.GREY)
+        motion = lambda labels: " or ".join(labels).replace("_", " ")
+        shaded = [(motion(s.labels), colour_of(s.labels), 0.1, (s.low_rpm, s.high_rpm)) for s in zones]
+    drawn: set[str] = set()
+    for label, colour, alpha, (first, last) in shaded:
+        name = f"_{label}" if label in drawn else label
+        ax.axvspan(first, last, color=colour, alpha=alpha, linewidth=0, zorder=0, label=name)
+        drawn.add(label)
+    ax.set_xlim(low, high)
+    return ax
+
+
+def published_edges(published: PublishedCase) -> dict[str, float]:
+    """The published edges of a case [rpm] by name."""
+    return {
+        "zone 1 onset": published.zone_1_onset_rpm,
+        "zone 1 exit": published.zone_1_exit_rpm,
+        "zone 2 onset": published.zone_2_onset_rpm,
+    }
+
+
+def mark_published(ax: Axes, published: PublishedCase, text: bool = True) -> Axes:
+    """Mark the published edges inside the axis with dotted lines, and triangles with their speed above the frame.
+
+    A triangle points into the zone: right at an onset, left at an exit.
+    """
+    low, high = ax.get_xlim()
+    inside = {name: rpm for name, rpm in published_edges(published).items() if low <= rpm <= high}
+    above = ax.get_xaxis_transform()
+    for i, (name, rpm) in enumerate(inside.items()):
+        label = "published edge" if i == 0 else None
+        ax.axvline(rpm, color=style.BLACK, linewidth=0.9, linestyle=(0, (1, 2)), label=label)
+        if text:
+            marker = "<" if name.endswith("exit") else ">"
+            ax.plot(rpm, 1.0, marker, color=style.BLACK, markersize=5, transform=above, clip_on=False)
+            look = {"textcoords": "offset points", "ha": "center", "va": "bottom", "fontsize": 8}
+            ax.annotate(f"{rpm:.0f}", (rpm, 1.0), (0, 5), xycoords=above, **look)
+    return ax
+
+
+def mark_operating(ax: Axes, spans: Sequence[Span]) -> Axes:
+    """Mark operating speeds [rpm]: a line for a speed, a light band for a range."""
+    low, high = ax.get_xlim()
+    for i, (first, last) in enumerate(span for span in spans if span[1] >= low and span[0] <= high):
+        label = "operating speed" if i == 0 else "_operating speed"
+        for edge in {first, last}:
+            ax.axvline(edge, color=style.PURPLE, linewidth=1.1, linestyle=(0, (6, 2)), zorder=2, label=label)
+            label = "_operating speed"
+        if last > first:
+            ax.axvspan(first, last, color=style.PURPLE, alpha=0.12, linewidth=0, zorder=0.5)
+    ax.set_xlim(low, high)
+    return ax
+
+
+def zone_strip(
+    loss: Sequence[Zone],
+    chaotic: Sequence[Zone],
+    limits_rpm: Span,
+    operating: Sequence[Span] = (),
+    published: PublishedCase | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """One row of bars for each kind of zone; operating speeds in a row on top, with lines through all rows.
+
+    **Arguments:** synchronous-loss and chaotic zones; ends of the sweep, operating speeds and ranges [rpm]; the
+    published case; axes. An open zone reaches to the end of the axis.
+    """
+    rows: list[tuple[str, str, Sequence[Span]]] = [("operating", style.PURPLE, operating)] if operating else []
+    for name, colour, zones in (("synchronous loss", style.BLUE, loss), ("chaotic", style.VERMILION, chaotic)):
+        rows.append((name, colour, [zone_span(zone, *limits_rpm) for zone in zones]))
+    if published is not None:
+        ends = ((low, limits_rpm[1] if high is None else high) for low, high in published_zones(published))
+        rows.append(("published", style.GREY, [(low, high) for low, high in ends if high > low]))
+    ax = style.axes_or_new(ax, 9.5, 0.9 + 0.42 * len(rows))
+    low, high = limits_rpm
+    least = 0.003 * (high - low)  # a single speed must be visible
+    for i, (_, colour, spans) in enumerate(rows):
+        ax.barh(i, high - low, left=low, height=0.62, color=style.GREY, alpha=0.13, linewidth=0)
+        for first, last in spans:
+            width = max(last - first, least)
+            ax.barh(i, width, left=(first + last - width) / 2, height=0.62, color=colour, linewidth=0)
+    for edge in {edge for span in operating for edge in span}:
+        ax.axvline(edge, color=style.PURPLE, linewidth=1.0, linestyle=(0, (5, 2)), zorder=3)
+    ax.set(xlim=limits_rpm, ylim=(len(rows) - 0.5, -0.5))
+    ax.set_yticks(range(len(rows)), [name for name, _, _ in rows])
+    ax.tick_params(axis="y", length=0)
+    ax.grid(False, axis="y")
+    ax.spines[["left"]].set_visible(False)
+    return label_speed(ax)
 
 
 SWEPT = ("cage_slip", "pocket_force_mean_sum_N", "pocket_force_max_N", "friction_power_W", "synchronous_force_x_N")
 COMPARED = ("cage_slip", "friction_power_W", "pocket_impulse_N_s", "land_impulse_N_s", "pocket_wear_mm3_per_h")
 """Quantities of a whole bearing in the figure of a sweep and in that of several bearings."""
-BESIDE_COLOURS = (BLUE, VERMILION, *LINE_COLOURS[1:4])
+BESIDE_COLOURS = (style.BLUE, style.VERMILION, *style.LINE_COLOURS[1:4])
 """Colours of designs beside each other."""
 
 
@@ -68,7 +209,7 @@ def orbit_diagram(
     **Arguments:** sweep; component of the state (1: vertical displacement of a cage); axes; range of speed for a zoomed
     diagram, whose vertical limits then fit the states in it.
     """
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     named = quantity(str(sweep["component"].values[component]))
     low, high = speed_limits(sweep) if limits_rpm is None else limits_rpm
     inside = sweep.isel(speed=(sweep["rpm"].values >= low) & (sweep["rpm"].values <= high))
@@ -76,16 +217,16 @@ def orbit_diagram(
     speeds, labels = np.broadcast_to(rpm[:, None, None], points.shape), inside["label"].values.astype(str)
     kind = np.where(np.char.startswith(labels, "periodic"), "periodic", labels)  # all periods together
     size = 1.8 if rpm.size > 150 else 2.5
-    for label, colour in KIND_COLOURS.items():
+    for label, colour in style.KIND_COLOURS.items():
         lanes = kind == label
         if np.any(lanes):
-            style = dots(colour, size) | {"alpha": 0.5, "rasterized": True}
-            ax.plot(speeds[lanes].ravel(), points[lanes].ravel(), **style, label=label)
+            look = style.dots(colour, size) | {"alpha": 0.5, "rasterized": True}
+            ax.plot(speeds[lanes].ravel(), points[lanes].ravel(), **look, label=label)
     lost = rpm[np.any(failed(inside), axis=1)]
     if lost.size:
-        foot = {"color": BLACK, "markersize": 4, "transform": ax.get_xaxis_transform()}
+        foot = {"color": style.BLACK, "markersize": 4, "transform": ax.get_xaxis_transform()}
         ax.plot(lost, np.full(lost.size, 0.015), "x", **foot, label="failed")
-    ax.set(xlim=(low, high), ylim=padded_limits(points), ylabel=named.label)
+    ax.set(xlim=(low, high), ylim=style.padded_limits(points), ylabel=named.label)
     return label_speed(ax, sweep)
 
 
@@ -95,21 +236,21 @@ def exponent_strip(sweep: xr.Dataset, ax: Axes | None = None) -> Axes:
 
     The lower limit is cut where strongly attracting orbits would hide the range around zero.
     """
-    ax = axes_or_new(ax, height=2.5)
+    ax = style.axes_or_new(ax, height=2.5)
     rpm = sweep["rpm"].values
     largest, error = sweep["exponents"].values[..., 0], sweep["standard_error"].values[..., 0]
     finished = np.where(failed(sweep), -np.inf, largest)
     lane = (np.arange(rpm.size), np.argmax(finished, axis=1))
     top = np.where(np.isfinite(finished[lane]), finished[lane], np.nan)
     band = 2 * error[lane]
-    ax.axhline(0, color=BLACK, linewidth=0.8)
+    ax.axhline(0, color=style.BLACK, linewidth=0.8)
     if "strobe" in sweep:
-        threshold = {"color": VERMILION, "linewidth": 0.8, "linestyle": "--"}
+        threshold = {"color": style.VERMILION, "linewidth": 0.8, "linestyle": "--"}
         ax.axhline(CHAOS_THRESHOLD, **threshold, label=f"chaotic above {CHAOS_THRESHOLD}")
-    ax.plot(np.repeat(rpm, largest.shape[1]), largest.ravel(), **dots(GREY, 3), label="each start")
-    shade = {"color": SKY, "alpha": 0.5, "linewidth": 0, "label": "±2 standard errors"}
+    ax.plot(np.repeat(rpm, largest.shape[1]), largest.ravel(), **style.dots(style.GREY, 3), label="each start")
+    shade = {"color": style.SKY, "alpha": 0.5, "linewidth": 0, "label": "±2 standard errors"}
     ax.fill_between(rpm, top - band, top + band, **shade)
-    ax.plot(rpm, top, color=BLUE, linewidth=0.9, label="largest of the starts")
+    ax.plot(rpm, top, color=style.BLUE, linewidth=0.9, label="largest of the starts")
     ax.set(xlim=speed_limits(sweep), ylim=_exponent_limits(largest, top, band))
     ax.set_ylabel("largest exponent\nper revolution " + quantity("largest_exponent").symbol)
     return label_speed(ax, sweep)
@@ -127,18 +268,6 @@ def _exponent_limits(values: np.ndarray, top: np.ndarray, band: np.ndarray) -> S
     return max(min(1.15 * float(finite.min()), -0.05), min(1.15 * calm, -high)), high
 
 
-def quantity_over_speed(sweep: xr.Dataset, name: str, ax: Axes | None = None) -> Axes:
-    """A reported quantity over speed, a line for each initial state, with bars of one standard error."""
-    ax = axes_or_new(ax, 6.0, 3.2)
-    label, times = labelled(sweep[name])
-    values, error = times * sweep[name].values, times * scatter(sweep[f"{name}_blocks"].values, axis=-1)
-    for i, colour in zip(range(values.shape[1]), cycle(LINE_COLOURS), strict=False):
-        style: Any = dict(color=colour, linewidth=0.9, marker=".", markersize=5, elinewidth=0.7, label=f"start {i + 1}")
-        ax.errorbar(sweep["rpm"].values, values[:, i], np.nan_to_num(error[:, i]), **style)
-    ax.set(ylabel=label, xlim=speed_limits(sweep))
-    return label_speed(ax, sweep)
-
-
 def sweep_figure(
     sweep: xr.Dataset,
     zones: Zones | Sequence[Stretch] | None = None,
@@ -154,12 +283,13 @@ def sweep_figure(
     draw: list[Callable[[Axes], Axes]] = []
     if "strobe" in sweep:
         draw.append(lambda ax: orbit_diagram(sweep, component, ax))
-    draw += [lambda ax, name=name: quantity_over_speed(sweep, name, ax) for name in reported(sweep, SWEPT)]
+    mean = {"mean over initial states": sweep}
+    draw += [lambda ax, name=name: label_speed(_lines(ax, name, mean), sweep) for name in reported(sweep, SWEPT)]
     if sweep.sizes["exponent"]:
         draw.append(lambda ax: exponent_strip(sweep, ax))
     columns = 2 if len(draw) > 3 else 1
     rows = math.ceil(len(draw) / columns)
-    figure = new_figure(9.5 if columns == 1 else 11.5, 1.6 + 2.4 * rows)
+    figure = style.new_figure(9.5 if columns == 1 else 11.5, 1.6 + 2.4 * rows)
     heights = (2.6, *[1.0] * (rows - 1)) if "strobe" in sweep else [1.0] * rows
     cells = figure.subplots(rows, columns, sharex=True, squeeze=False, height_ratios=heights)
     axes = [panel(ax) for panel, ax in zip(draw, cells.ravel(), strict=False)]
@@ -172,7 +302,7 @@ def sweep_figure(
             shade_zones(ax, zones)
         if published is not None:
             mark_published(ax, published, text=ax is axes[0])
-    legend_below(figure, *axes)
+    style.legend_below(figure, *axes)
     axes[0].set_title(title, loc="left", fontsize=11, pad=18 if published is not None else 8)
     return add_shaft_axes(figure, sweep)
 
@@ -184,7 +314,7 @@ def sweeps_beside(names: Sequence[str], sweeps: Sequence[xr.Dataset], zones: Seq
     """
     if any("strobe" not in sweep for sweep in sweeps):
         return quantities_beside(names, sweeps, [*reported(sweeps[0], COMPARED), "exponent"])
-    figure = new_figure(12.0, 6.4)
+    figure = style.new_figure(12.0, 6.4)
     cells = figure.subplots(2, len(sweeps), sharex="col", sharey="row", squeeze=False, height_ratios=(2.0, 1.0))
     draw_beside(cells, names, sweeps, zones)
     return figure
@@ -212,46 +342,40 @@ def draw_beside(
             ax.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
     for ax, sweep in zip(cells[1], sweeps, strict=True):
         add_shaft_axes(figure, sweep, [ax])
-    legend_below(figure, *cells.ravel())
+    style.legend_below(figure, *cells.ravel())
 
 
-def _lines(ax: Axes, name: str, sweeps: dict[str, xr.Dataset]) -> None:
+def _lines(ax: Axes, name: str, sweeps: dict[str, xr.Dataset]) -> Axes:
     """A line for each sweep: means of a variable over the initial states, with standard errors."""
     for (text, sweep), colour in zip(sweeps.items(), cycle(BESIDE_COLOURS), strict=False):
         label, times = labelled(sweep["exponents" if name == "exponent" else name])
         mean, error = (times * x for x in mean_over_starts(sweep, name))
-        style: Any = dict(color=colour, linewidth=1.1, marker=".", elinewidth=0.8, label=text)
-        dress(ax).errorbar(sweep["rpm"].values, mean, np.nan_to_num(error), **style)
+        look: Any = dict(color=colour, linewidth=1.1, marker=".", elinewidth=0.8, label=text)
+        style.dress(ax).errorbar(sweep["rpm"].values, mean, np.nan_to_num(error), **look)
         ax.set_ylabel(label)
+    return ax
 
 
-def quantities_beside(names: Sequence[str], sweeps: Sequence[xr.Dataset], quantities: Sequence[str]) -> Figure:
-    """Variables of several sweeps over speed, with a line for each design."""
+def quantities_beside(
+    names: Sequence[str],
+    sweeps: Sequence[xr.Dataset],
+    quantities: Sequence[str],
+    differ: Sequence[Span] = (),
+    title: str = "",
+) -> Figure:
+    """Variables of several sweeps, or ramps, over speed with a line for each; stretches of speed [rpm] in which they
+    differ are shaded."""
     columns = 2 if len(quantities) > 3 else 1
     rows = math.ceil(len(quantities) / columns)
-    figure = new_figure(9.5 if columns == 1 else 11.5, 1.2 + 2.4 * rows)
-    cells = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    figure = style.new_figure(9.5 if columns == 1 else 11.5, 1.2 + 2.4 * rows)
+    cells, rpm = figure.subplots(rows, columns, sharex=True, squeeze=False), sweeps[0]["rpm"].values
+    half = 0.5 * float(rpm[1] - rpm[0]) if rpm.size > 1 else 0.0
     for ax, name in zip(cells.ravel(), quantities, strict=False):
         _lines(ax, name, dict(zip(names, sweeps, strict=True)))
+        for i, (low, high) in enumerate(differ):
+            label = "_differs" if i else "differs: hysteresis"
+            ax.axvspan(low - half, high + half, color=style.ZONE, linewidth=0, zorder=0, label=label)
     for ax in cells[-1]:
         label_speed(ax, sweeps[0])
-    legend_below(figure, cells[0, 0])
-    return add_shaft_axes(figure, sweeps[0])
-
-
-def ramp_figure(
-    up: xr.Dataset, down: xr.Dataset, quantities: Sequence[str], stretches: Sequence[Span] = (), title: str = ""
-) -> Figure:
-    """Variables over speed as it rises and as it falls; stretches of speed [rpm] in which they differ are shaded."""
-    figure = new_figure(9.5, 1.4 + 2.3 * len(quantities))
-    cells = figure.subplots(len(quantities), 1, sharex=True, squeeze=False)[:, 0]
-    rpm = up["rpm"].values
-    half = 0.5 * float(rpm[1] - rpm[0]) if rpm.size > 1 else 0.0
-    for ax, name in zip(cells, quantities, strict=True):
-        _lines(ax, name, {"run-up": up, "run-down": down})
-        for i, (low, high) in enumerate(stretches):
-            label = "differs: hysteresis" if i == 0 else "_differs"
-            ax.axvspan(low - half, high + half, color=ZONE, linewidth=0, zorder=0, label=label)
-    label_speed(cells[-1], up)
-    legend_below(figure, *cells, ncols=4)
-    return add_shaft_axes(entitled(figure, title), up)
+    style.legend_below(figure, cells[0, 0])
+    return add_shaft_axes(style.entitled(figure, title), sweeps[0])

@@ -7,7 +7,7 @@ from typing import Any
 
 from .._parameters import EXTRA, parameter_info, parameters
 from ..design import LastingEdge, MeanGradient, SolvedEdge, ZoneWidth, zone_width
-from ..models import CageModel
+from ..models import AbstractForcedSystem
 from ..orbits import Cascade, Explained, LossZones, Sensitivity, limit_sensitivity, sensitivities, sensitivity
 from ..solve import AbstractMethod
 from .tables import Beside, Column, Table, chosen, number, rows_table, speed_columns
@@ -32,7 +32,7 @@ def _asked(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
     return asked | ({FIXED_RHO: FIRST} if set(FIRST) <= set(asked) else {})
 
 
-def to_be_turned(model: CageModel, slopes: Iterable[Sensitivity]) -> list[Sensitivity]:
+def to_be_turned(model: AbstractForcedSystem, slopes: Iterable[Sensitivity]) -> list[Sensitivity]:
     """Sensitivities with the parameters that a designer can choose; laws of one's own stay."""
     info = parameter_info(model)
     stays = lambda name: info[name].kind in TURNED or name.startswith(EXTRA)
@@ -41,14 +41,14 @@ def to_be_turned(model: CageModel, slopes: Iterable[Sensitivity]) -> list[Sensit
     ]
 
 
-def not_fixed(model: CageModel, names: Iterable[str]) -> list[str]:
+def not_fixed(model: AbstractForcedSystem, names: Iterable[str]) -> list[str]:
     """Parameters that have a tolerance: all but definitions, units and constants of nature and of the numerics."""
     info = parameter_info(model)
     return [n for n in names if info[n].kind != "fixed" or n.startswith(EXTRA)]
 
 
 def edge_slopes(
-    model: CageModel, loss: LossZones, explained: Explained, method: AbstractMethod | None
+    model: Any, loss: LossZones, explained: Explained, method: AbstractMethod | None
 ) -> dict[str, Sensitivity]:
     """Sensitivities of the synchronous-loss edges, and of chaotic edges that coincide with something exact."""
     slopes = sensitivities(model, loss.edges, method)
@@ -80,7 +80,7 @@ def elasticities_table(name: str, slopes: Mapping[str, Sensitivity], beside: Bes
     return dataclasses.replace(table, data=rows)
 
 
-def gradient_table(name: str, model: CageModel, slope: Sensitivity) -> Table:
+def gradient_table(name: str, model: AbstractForcedSystem, slope: Sensitivity) -> Table:
     """Derivatives of one edge or width: gap and eccentricity on top, then the largest elasticities first.
 
     All is about the speed of the cage; that of the shaft also moves with all that enters their ratio.
@@ -105,9 +105,13 @@ def missing_notes(edges: Mapping[str, Sensitivity]) -> list[str]:
     """Edges that one would expect and that are not there or not to be trusted, and how good the gradients are."""
     notes = [f"There is no {name} in the range." for name in EXPECTED if name not in edges]
     notes += [f"Left out: {n}, {e.kind} ({e.status})." for n, e in edges.items() if not e.trusted]
+    return [*notes, f"Gradients against the scaling of units, largest relative residual: {residual_words(edges)}"]
+
+
+def residual_words(edges: Mapping[str, Sensitivity]) -> str:
+    """The largest residual of the gradients that are to be trusted against the scaling of units."""
     residuals = [abs(r) for e in edges.values() if e.trusted for r in e.homogeneity.values()]
-    worst = f"{max(residuals):.1e}" if residuals else "-"
-    return [*notes, f"Gradients against the scaling of units, largest relative residual: {worst}"]
+    return f"{max(residuals):.0e}" if residuals else "none is to be trusted"
 
 
 def source_notes(explained: Explained) -> list[str]:

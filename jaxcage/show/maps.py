@@ -1,6 +1,7 @@
-"""Maps over two parameters: bifurcation curves over the largest exponent, quantities and labels as colours."""
+"""Maps over speed and a parameter: its range, bifurcations followed over both, exponents, quantities and labels."""
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,33 +13,112 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from .._errors import ArgumentError
+from .._parameters import parameter_info, parameters, within
 from ..analysis import failed
-from ..orbits import Curve
+from ..orbits import Curve, Point, curve
 from ..quantities import quantity
-from .diagrams import labelled, reported
+from ..solve import AbstractMethod
+from . import style
+from .diagrams import label_speed, labelled, reported
 from .orbit_figures import chosen_pieces, mark_of
-from .speed_axes import label_speed
-from .style import (
-    GREY,
-    KIND_COLOURS,
-    MOTION_COLOURS,
-    Halo,
-    axes_or_new,
-    dress,
-    entitled,
-    legend_above,
-    new_figure,
-    padded_limits,
-    readable,
-)
-from .tables import SHOWN, factor
+from .tables import SHOWN, Column, Table, factor, rows_table
 
 
+SPEED = "speed"
+BELOW, ABOVE = 0.8, 1.25
+"""Range of a parameter over its value, unless told otherwise."""
 STEEPEST = 0.3
 """Exponent at which the colours end."""
 MAPPED = ("cage_slip", "friction_power_W")
-"""Quantities of a whole bearing in a map."""
-SPEED = "speed"
+"""Quantities of a map, of those that the model reports."""
+RPM = 30 / np.pi
+
+
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """A parameter between two values, the second direction of a map."""
+
+    name: str
+    lower: float
+    """[SI]."""
+    upper: float
+    unit: str
+    """SI unit."""
+    speed_text: str = "cage speed"
+    """Words for the speed, the first direction."""
+
+    @property
+    def head(self) -> str:
+        """Name with the unit in which values are shown."""
+        return Column(self.name, (), self.unit).title
+
+    @property
+    def label(self) -> str:
+        """The same as words of a figure."""
+        return f"{self.head[:1].upper()}{style.readable(self.head[1:])}"
+
+    def shown(self, values: Any) -> np.ndarray:
+        """Values [SI] in the unit in which they are shown."""
+        return np.asarray(values * factor(self.unit, SHOWN.get(self.unit, self.unit)))
+
+
+def parameter_axis(model: Any, name: str, lower: float | None = None, upper: float | None = None) -> Axis:
+    """A parameter between two values [SI], by default a fifth below to a quarter above its own.
+
+    **Raises:** `ArgumentError` for a range that is not allowed, or does not hold the value itself.
+    """
+    info, value = parameter_info(model)[name], float(parameters(model)[name])
+    least = max(info.lower, 1.01 * float(model.eccentricity)) if name == "guidance_gap" else info.lower
+    below, above = sorted((BELOW * value, ABOVE * value))
+    low, high = max(below, least) if lower is None else lower, min(above, info.upper) if upper is None else upper
+    unit = "" if info.unit == "1" else f" {info.unit}"
+    for argument, given in (("lower", low), ("upper", high)):
+        if not within(given, info.lower, info.upper):
+            allowed = f"a value of {name} from {info.lower:g} to {info.upper:g}{unit}"
+            raise ArgumentError(argument, said=f"must be {allowed}, but {given:g}{unit} was given.")
+    if not low < value < high:
+        wanted = f"must have {name} = {value:g}{unit} between them"
+        raise ArgumentError("lower", "upper", said=f"{wanted}, but the range is {low:g} to {high:g}{unit}.")
+    return Axis(name, low, high, info.unit, model.speed_text)
+
+
+def follow_edges(
+    model: Any,
+    edges: Mapping[str, Point],
+    speeds: tuple[float, float],
+    axis: Axis,
+    method: AbstractMethod | None,
+    say: Callable[[str, int, int], None],
+) -> tuple[list[Curve], dict[str, str]]:
+    """A curve through each named edge over speeds [rad/s] and a parameter, and the reason where there is none."""
+    curves, refused = [], {}
+    limits: dict[str, Any] = {"lower": axis.lower, "upper": axis.upper, "x_lower": speeds[0], "x_upper": speeds[1]}
+    for done, (name, point) in enumerate(edges.items()):
+        say("curves", done, len(edges))
+        if point.kind == "branch-point":
+            refused[name] = "a branch point"
+            continue
+        try:
+            curves.append(curve(model, point, SPEED, axis.name, **limits, name=name, method=method))
+        except ValueError:
+            refused[name] = "Newton's method did not find it again"
+    say("curves", len(edges), len(edges))
+    return curves, refused
+
+
+def curves_table(title: str, curves: list[Curve], axis: Axis) -> Table:
+    """The ranges that curves cover, and how they end."""
+    ends = lambda name, values: {f"{name}_low": float(np.min(values)), f"{name}_high": float(np.max(values))}
+    rows = [
+        {"edge": c.name, "kind": c.kind, "points": int(np.size(c.x_value)), "ends": " / ".join(c.ended)}
+        | {"x": RPM * np.asarray(c.x_value), "y": np.asarray(c.y_value), "genuine": c.genuine}
+        | {**ends("x", c.x_value), **ends("y", c.y_value)}
+        for c in curves
+    ]
+    columns = [Column("edge", ()), Column("kind", ())]
+    for key, name, unit in (("x", SPEED, "rad/s"), ("y", axis.name, axis.unit)):
+        columns += [Column(f"{name} from", (), unit, key=f"{key}_low"), Column("to", (), unit, key=f"{key}_high")]
+    return rows_table(title, rows, [*columns, Column("points", ()), Column("ends", ())], "curves")
 
 
 def top_exponent(found: xr.Dataset) -> Float[np.ndarray, "x y"]:
@@ -47,55 +127,34 @@ def top_exponent(found: xr.Dataset) -> Float[np.ndarray, "x y"]:
     return np.where(np.isfinite(finished), finished, np.nan)
 
 
-def _shown(values: np.ndarray, name: str, unit: str) -> tuple[Float[np.ndarray, " n"], str]:
-    """Values of a parameter [SI] in the unit in which they are shown, and the label of their axis."""
-    if name == SPEED:
-        return np.asarray(values) * factor("rad/s", "rpm"), ""
-    shown = SHOWN.get(unit, unit)
-    return np.asarray(values) * factor(unit, shown), readable(name).capitalize() + (f" [{shown}]" if shown else "")
+def stability_map(axis: Axis, curves: Sequence[Curve], ax: Axes | None = None, found: xr.Dataset | None = None) -> Axes:
+    """Curves of bifurcations over speed and a parameter, coloured by kind.
 
+    **Arguments:** the parameter; curves; axes; a map of labels, whose largest exponents are drawn beneath with white at
+    zero.
 
-def _name_axes(ax: Axes, x: str, y: str) -> Axes:
-    if x:
-        ax.set_xlabel(x)
-    else:
-        label_speed(ax)
-    ax.set_ylabel(y)
-    return ax
-
-
-def stability_map(
-    curves: Sequence[Curve], ax: Axes | None = None, *, found: xr.Dataset | None = None, unit: str = "1"
-) -> Axes:
-    """Curves of bifurcations over speed, coloured by kind.
-
-    **Arguments:** curves whose `x` is the speed; axes; a map of labels, whose largest exponents are drawn beneath with
-    white at zero; SI unit of the parameter.
-
-    **Raises:** `ValueError` if a curve is not over speed, or two have different parameters.
+    **Raises:** `ValueError` if a curve is over anything else.
     """
-    others = {c.y for c in curves}
-    if any(c.x != SPEED for c in curves) or len(others) > 1:
-        given = ", ".join(f"{c.y} over {c.x}" for c in curves)
-        raise ArgumentError("curves", said=f"must all be of one parameter over speed, but {given} was given.")
-    ax = axes_or_new(ax, 9.0, 5.0)
-    lines = [(_shown(c.x_value, c.x, "rad/s")[0], _shown(c.y_value, c.y, unit)[0]) for c in curves]
+    if other := [f"{c.y} over {c.x}" for c in curves if (c.x, c.y) != (SPEED, axis.name)]:
+        raise ArgumentError("curves", said=f"must be of {axis.name} over speed, but {', '.join(other)} was given.")
+    ax = style.axes_or_new(ax, 9.0, 5.0)
+    lines = [(RPM * np.asarray(c.x_value), axis.shown(c.y_value)) for c in curves]
     for c, (x, y) in zip(curves, lines, strict=True):
         _draw_curve(ax, c, x, y)
     if curves:
-        legend_above(ax)
+        style.legend_above(ax)
     if found is None:
         across, upward = (np.concatenate([line[i] for line in lines] or [np.zeros(0)]) for i in (0, 1))
-        ax.set(xlim=padded_limits(across), ylim=padded_limits(upward))
-        return _name_axes(ax, "", _shown(np.zeros(1), "".join(others), unit)[1])
-    names = [str(name) for name in found["label"].dims[:2]]
-    (x, across), (y, upward) = (_shown(found[name].values, name, unit) for name in names)
-    ax.grid(False)
-    style = {"cmap": "RdBu_r", "vmin": -STEEPEST, "vmax": STEEPEST, "rasterized": True, "alpha": 0.85, "zorder": 0}
-    mesh = ax.pcolormesh(borders(x), borders(y), np.ma.masked_invalid(top_exponent(found)).T, **style)
-    ax.figure.colorbar(mesh, ax=ax, label=quantity("largest_exponent").label, pad=0.01, extend="both")
-    ax.set(xlim=borders(x)[[0, -1]], ylim=borders(y)[[0, -1]])
-    return _name_axes(ax, across, upward)
+        ax.set(xlim=style.padded_limits(across), ylim=style.padded_limits(upward))
+    else:
+        ax.grid(False)
+        x, y = _cells(found, axis)
+        look = {"cmap": "RdBu_r", "vmin": -STEEPEST, "vmax": STEEPEST, "rasterized": True, "alpha": 0.85, "zorder": 0}
+        mesh = ax.pcolormesh(x, y, np.ma.masked_invalid(top_exponent(found)).T, **look)
+        ax.figure.colorbar(mesh, ax=ax, label=quantity("largest_exponent").label, pad=0.01, extend="both")
+        ax.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
+    ax.set_ylabel(axis.label)
+    return label_speed(ax, axis.speed_text)
 
 
 def _draw_curve(ax: Axes, curve: Curve, x: np.ndarray, y: np.ndarray) -> None:
@@ -105,68 +164,66 @@ def _draw_curve(ax: Axes, curve: Curve, x: np.ndarray, y: np.ndarray) -> None:
     for label, chosen, width, dash in (("neutral saddles", ~genuine, 1.6, ":"), (curve.kind, genuine, 2.0, "-")):
         if np.any(chosen):
             name = f"_{label}" if label in drawn else label
-            style = {"linestyle": dash, "color": mark_of(curve.kind).colour, "path_effects": [Halo(3.6)], "zorder": 3}
-            ax.plot(*chosen_pieces(x, y, chosen), linewidth=width, **style, label=name)
+            look = {
+                "linestyle": dash,
+                "color": mark_of(curve.kind).colour,
+                "path_effects": style.halo(3.6),
+                "zorder": 3,
+            }
+            ax.plot(*chosen_pieces(x, y, chosen), linewidth=width, **look, label=name)
 
 
-def borders(x: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n+1"]:
-    """Borders of cells around ascending numbers, half way between them, of numbers in equal ratios in ratio."""
-    if x.size > 2 and x[0] > 0 and np.allclose(np.diff(np.log(x)), np.log(x[1] / x[0])):
-        return np.exp(_middles(np.log(x)))
-    return _middles(x)
+def _cells(found: xr.Dataset, axis: Axis) -> tuple[np.ndarray, np.ndarray]:
+    """Borders of the cells of a map over speed [rpm] and its parameter, half way between their points."""
+    sides = []
+    for x in (RPM * found[SPEED].values, axis.shown(found[axis.name].values)):
+        middle = (x[1:] + x[:-1]) / 2
+        sides.append(np.concatenate([[2 * x[0] - middle[0]], middle, [2 * x[-1] - middle[-1]]]))
+    return sides[0], sides[1]
 
 
-def _middles(x: np.ndarray) -> np.ndarray:
-    middle = (x[1:] + x[:-1]) / 2
-    return np.concatenate([[2 * x[0] - middle[0]], middle, [2 * x[-1] - middle[-1]]])
+def map_figure(axis: Axis, curves: Sequence[Curve], found: xr.Dataset | None, title: str = "") -> Figure:
+    """Largest exponents with the curves on top, labels, and what the model reports: means over initial states.
 
-
-def map_figure(found: xr.Dataset, title: str = "", unit: str = "1") -> Figure:
-    """Quantities that the model reports, largest exponent and label over two parameters: means over initial states.
-
-    **Arguments:** a map of labels; title; SI unit of the second parameter, whose axis is logarithmic if its values are
-    in equal ratios.
+    **Arguments:** the parameter; curves; a map of labels, or None for the curves alone; title.
     """
-    names = [str(name) for name in found["label"].dims[:2]]
-    (x, across), (y, upward) = (_shown(found[name].values, name, unit) for name in names)
-    mean = lambda name: found[name].mean("start", skipna=True).values
-    panels = [
-        (label, times * mean(name)) for name in reported(found, MAPPED) for label, times in [labelled(found[name])]
-    ]
-    panels.append((quantity("largest_exponent").label, mean("exponents")[..., 0]))
-    figure = new_figure(11.5, 1.0 + 3.5 * ((len(panels) + 2) // 2))
-    cells = figure.subplots((len(panels) + 2) // 2, 2, sharex=True, sharey=True, squeeze=False)
-    for ax in cells.ravel():
-        dress(ax).grid(False)
-    for ax, (label, z) in zip(cells.ravel(), panels, strict=False):
+    if found is None:
+        figure = style.new_figure(10.0, 6.0)
+        stability_map(axis, curves, figure.subplots())
+        return style.entitled(figure, title)
+    names, (x, y) = reported(found, MAPPED), _cells(found, axis)
+    rows = (len(names) + 3) // 2
+    figure = style.new_figure(11.5, 1.0 + 3.8 * rows)
+    cells = figure.subplots(rows, 2, squeeze=False).ravel()
+    stability_map(axis, curves, cells[0], found).set_title(
+        "Largest exponent", fontsize=10, loc="left", pad=20 if curves else 6
+    )
+    _colour_labels(cells[1], x, y, found["label"].values.astype(str))
+    for ax, name in zip(cells[2:], names, strict=False):
+        label, times = labelled(found[name])
+        z = times * found[name].mean("start", skipna=True).values
         ratio = np.nanmin(z) > 0 and np.nanmax(z) > 20 * np.nanmin(z)
-        drawn = ax.pcolormesh(borders(x), borders(y), z.T, cmap="viridis", norm=LogNorm() if ratio else None)
+        drawn = style.dress(ax).pcolormesh(x, y, z.T, cmap="viridis", norm=LogNorm() if ratio else None)
         figure.colorbar(drawn, ax=ax)
         ax.set_title(label, fontsize=10, loc="left")
-    _colour_labels(cells.ravel()[len(panels)], borders(x), borders(y), found["label"].values.astype(str))
-    for ax in cells.ravel()[len(panels) + 1 :]:
+    for ax in cells[1 : 2 + len(names)]:
+        ax.set_ylabel(axis.label)
+        label_speed(ax, axis.speed_text).grid(False)
+    for ax in cells[2 + len(names) :]:
         ax.set_axis_off()
-    for ax in cells[-1]:
-        _name_axes(ax, across, "")
-    for ax in cells[:, 0]:
-        ax.set_ylabel(upward)
-    if not np.allclose(np.diff(borders(y), 2), 0.0, atol=1e-9 * float(np.ptp(y))):
-        cells[0, 0].set_yscale("log")
-    return entitled(figure, title)
+    return style.entitled(figure, title)
 
 
 def _colour_labels(ax: Axes, x: np.ndarray, y: np.ndarray, labels: np.ndarray) -> None:
     """Colours of the labels, grey where initial states differ or lanes failed."""
     kinds = np.where(np.char.startswith(labels, "periodic"), "periodic", labels)
-    known = {**KIND_COLOURS, **MOTION_COLOURS}
-    colour = lambda lanes: known.get(lanes[0], GREY) if len(set(lanes)) == 1 else GREY
-    ax.pcolormesh(x, y, np.array([[_pale(colour(lanes.tolist())) for lanes in row] for row in kinds.swapaxes(0, 1)]))
+    known = {**style.KIND_COLOURS, **style.MOTION_COLOURS}
+    pale: Any = lambda colour: tuple(0.45 + 0.55 * part for part in to_rgb(colour))
+    colour = lambda lanes: pale(known.get(lanes[0], style.GREY) if len(set(lanes)) == 1 else style.GREY)
+    style.dress(ax).pcolormesh(
+        x, y, np.array([[colour(lanes.tolist()) for lanes in row] for row in kinds.swapaxes(0, 1)])
+    )
     ax.set_title("Label (grey: the start decides, or failed)", fontsize=10, loc="left")
     met = [name for name in known if np.any(kinds == name)]
-    patches: list[Any] = [Patch(color=_pale(known[name]), label=name.replace("_", " ")) for name in met]
+    patches: list[Any] = [Patch(color=pale(known[name]), label=name.replace("_", " ")) for name in met]
     ax.legend(handles=patches, fontsize=8, loc="upper right")
-
-
-def _pale(colour: str) -> tuple[float, float, float]:
-    r, g, b = (0.45 + 0.55 * x for x in to_rgb(colour))
-    return r, g, b

@@ -9,30 +9,12 @@ import xarray as xr
 from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
-from matplotlib.transforms import offset_copy
-from scipy.optimize import isotonic_regression
 
 from .._errors import ArgumentError
 from ..orbits import Branch, Point
 from ..quantities import component_names, quantity
-from .diagrams import orbit_diagram
-from .speed_axes import label_speed
-from .style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    KIND_COLOURS,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
-    axes_or_new,
-    enlarge_dots,
-    legend_above,
-    lighter,
-    padded_limits,
-)
+from . import style
+from .diagrams import label_speed, orbit_diagram
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,23 +27,21 @@ class Mark:
 
 
 MARKS = {
-    "period-doubling": Mark("s", VERMILION, "PD"),
-    "Neimark-Sacker": Mark("D", GREEN, "NS"),
-    "fold": Mark("o", BLACK, "F"),
-    "branch-point": Mark("^", PURPLE, "BP"),
+    "period-doubling": Mark("s", style.VERMILION, "PD"),
+    "Neimark-Sacker": Mark("D", style.GREEN, "NS"),
+    "fold": Mark("o", style.BLACK, "F"),
+    "branch-point": Mark("^", style.PURPLE, "BP"),
 }
 """Marks of bifurcations in every figure."""
-PERIOD_COLOURS = {1: BLUE, 2: ORANGE, 3: PURPLE, 4: SKY}
+PERIOD_COLOURS = {1: style.BLUE, 2: style.ORANGE, 3: style.PURPLE, 4: style.SKY}
 LABEL_SIZE = 7.5
-FARTHEST = 2.0
-"""Largest distance of a label from its place, in widths of a label."""
 REACH = 1.6
 """Largest real and imaginary part of the multipliers that are shown."""
 
 
 def mark_of(kind: str) -> Mark:
     """Mark of a kind of bifurcation; an unknown kind is a purple cross and keeps its name."""
-    return MARKS.get(kind, Mark("P", PURPLE, kind))
+    return MARKS.get(kind, Mark("P", style.PURPLE, kind))
 
 
 def words(kind: str) -> str:
@@ -81,21 +61,21 @@ def branch_diagram(branches: Sequence[Branch], component: int = 1, ax: Axes | No
     if not branches or any(b.parameter != "speed" for b in branches):
         given = ", ".join(b.parameter for b in branches) or "no branch"
         raise ArgumentError("branches", said=f"must hold branches over speed, but {given} was given.")
-    ax = axes_or_new(ax, 9.0, 5.0)
+    ax = style.axes_or_new(ax, 9.0, 5.0)
     named = quantity(component_names(branches[0].state.shape[-1])[component])
     paths = [(b.periods, *polyline(b, component)) for b in branches]
     for periods in sorted({path[0] for path in paths}):
         _draw_paths(ax, periods, [path[1:] for path in paths if path[0] == periods])
     speeds, values = (np.concatenate([path[i] for path in paths]) for i in (1, 2))
-    ax.set(xlim=(speeds.min(), speeds.max()), ylim=padded_limits(values), ylabel=named.label)
+    ax.set(xlim=(speeds.min(), speeds.max()), ylim=style.padded_limits(values), ylabel=named.label)
     special = [p for b in branches for p in b.special]
     _mark_points(ax, special, lambda p: [(float(p.speed_rpm), float(p.state[component]) * named.factor)])
     if any(not p.edge for p in special):
-        style: dict[str, Any] = {"color": GREY, "markersize": 4.5, "markerfacecolor": "white"}
-        ax.plot([], [], "o", **style, label="hollow: unstable on both sides")
+        look: dict[str, Any] = {"color": style.GREY, "markersize": 4.5, "markerfacecolor": "white"}
+        ax.plot([], [], "o", **look, label="hollow: unstable on both sides")
     _write_above(ax, [p for p in special if p.edge])
     below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 4}
-    enlarge_dots(ax.legend(**below, frameon=False, fontsize=8.5, handlelength=2.0, columnspacing=1.6))
+    style.enlarge_dots(ax.legend(**below, frameon=False, fontsize=8.5, handlelength=2.0, columnspacing=1.6))
     return label_speed(ax)
 
 
@@ -103,11 +83,11 @@ def orbit_diagram_with_branches(
     sweep: xr.Dataset, branches: Sequence[Branch], component: int = 1, ax: Axes | None = None
 ) -> Axes:
     """Branches of periodic orbits over the orbit diagram, whose points are grey."""
-    ax = orbit_diagram(sweep, component, axes_or_new(ax, 9.0, 5.0))
-    clouds = [line for line in ax.get_lines() if line.get_label() in KIND_COLOURS]
+    ax = orbit_diagram(sweep, component, style.axes_or_new(ax, 9.0, 5.0))
+    clouds = [line for line in ax.get_lines() if line.get_label() in style.KIND_COLOURS]
     for i, line in enumerate(clouds):
         label = "simulated" if i == 0 else "_simulated"
-        line.set(color=GREY, alpha=0.5, markersize=1.4 * line.get_markersize(), zorder=1, label=label)
+        line.set(color=style.GREY, alpha=0.5, markersize=1.4 * line.get_markersize(), zorder=1, label=label)
     limits = np.array([ax.get_xlim(), ax.get_ylim()])
     branch_diagram(branches, component, ax)
     both = np.array([limits, [ax.get_xlim(), ax.get_ylim()]])
@@ -143,14 +123,14 @@ def _share(branch: Branch, point: Point) -> float:
 
 
 def _draw_paths(ax: Axes, periods: int, paths: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
-    colour = PERIOD_COLOURS.get(periods, GREEN)  # long periods share one
-    thin = {"color": lighter(colour), "linewidth": 0.8, "linestyle": (0, (4, 1.5)), "zorder": 2.0}
+    colour = PERIOD_COLOURS.get(periods, style.GREEN)  # long periods share one
+    thin = {"color": style.lighter(colour), "linewidth": 0.8, "linestyle": (0, (4, 1.5)), "zorder": 2.0}
     thick = {"color": colour, "linewidth": 2.4, "solid_capstyle": "butt", "zorder": 3.0}
-    for word, style in (("stable", thick), ("unstable", thin)):
+    for word, look in (("stable", thick), ("unstable", thin)):
         parts = [chosen_pieces(x, y, pieces if word == "stable" else ~pieces) for x, y, pieces in paths]
         x, y = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
         if x.size:
-            ax.plot(x, y, **style, label=f"period-{periods}, {word}")
+            ax.plot(x, y, **look, label=f"period-{periods}, {word}")
 
 
 def chosen_pieces(x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -170,65 +150,47 @@ def _mark_points(ax: Axes, points: Sequence[Point], places: Any) -> None:
             found = [place for p in points if p.kind == kind and p.edge == edge for place in places(p)]
             if not found:
                 continue
-            style: dict[str, Any] = {"marker": mark.marker, "linestyle": "none", "color": mark.colour}
+            look: dict[str, Any] = {"marker": mark.marker, "linestyle": "none", "color": mark.colour}
             if edge:
-                style |= {"markersize": 5.5, "markeredgecolor": "white", "markeredgewidth": 0.6, "zorder": 5.0}
+                look |= {"markersize": 5.5, "markeredgecolor": "white", "markeredgewidth": 0.6, "zorder": 5.0}
             else:
-                style |= {"markersize": 3.5, "markerfacecolor": "white", "markeredgewidth": 0.8, "zorder": 4.0}
-            ax.plot(*np.transpose(found), **style, label=words(kind) if edge else f"_{words(kind)}, hollow")
+                look |= {"markersize": 3.5, "markerfacecolor": "white", "markeredgewidth": 0.8, "zorder": 4.0}
+            ax.plot(*np.transpose(found), **look, label=words(kind) if edge else f"_{words(kind)}, hollow")
 
 
 def _write_above(ax: Axes, points: Iterable[Point]) -> None:
-    """Write kind and speed of points in a row above the frame, moved apart, with lines to their places.
-
-    Equal texts, as on branches that share a part, are written once; where there is no room for all near their places,
-    those with the nearest neighbours are left out.
-    """
-    texts = {f"{mark_of(p.kind).short} {p.speed_rpm:.0f}": p for p in points}
-    row = sorted(texts.items(), key=lambda item: item[1].speed_rpm)
+    """Write kind and speed of points above the frame; those without room beside an earlier one are left out."""
     low, high = ax.get_xlim()
-    gap = 1.3 * LABEL_SIZE / (ax.get_window_extent().width * 72 / ax.figure.dpi)
-    at = np.array([(p.speed_rpm - low) / (high - low) for _, p in row])
-    while at.size and np.max(np.abs(move_apart(at, gap) - at)) > FARTHEST * gap:
-        crowded = int(np.argmin(np.diff(at)))
-        at = np.delete(at, crowded)
-        row.pop(crowded)
-    upright = at.size > 1 and float(np.min(np.diff(at))) < 4 * gap
-    above = offset_copy(ax.transAxes, ax.figure, y=16, units="points")  # pyright: ignore[reportArgumentType]
-    line = {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0, "relpos": (0.5, 0.0)}
-    style = {"ha": "center", "va": "bottom", "fontsize": LABEL_SIZE, "annotation_clip": False, "arrowprops": line}
-    for (text, p), where in zip(row, move_apart(at, gap) if upright else at, strict=True):
-        places = {"xycoords": ax.get_xaxis_transform(), "textcoords": above, "rotation": 90 if upright else 0}
-        ax.annotate(text, (p.speed_rpm, 1.0), (where, 1.0), **places, **style, color=mark_of(p.kind).colour)
-
-
-def move_apart(at: np.ndarray, gap: float) -> np.ndarray:
-    """Ascending places at least `gap` apart and from 0 to 1, as near (least squares) to `at` as possible."""
-    steps = gap * np.arange(at.size)
-    if at.size == 0:
-        return at
-    return np.clip(isotonic_regression(at - steps).x, 0.0, max(0.0, 1.0 - steps[-1])) + steps
+    room = 1.3 * LABEL_SIZE / (ax.get_window_extent().width * 72 / ax.figure.dpi) * (high - low)
+    last = -np.inf
+    for p in sorted(points, key=lambda p: float(p.speed_rpm)):
+        if p.speed_rpm - last < room:
+            continue
+        last, mark = p.speed_rpm, mark_of(p.kind)
+        look = {"rotation": 90, "ha": "center", "va": "bottom", "fontsize": LABEL_SIZE, "color": mark.colour}
+        place = {"xycoords": ax.get_xaxis_transform(), "textcoords": "offset points", "annotation_clip": False}
+        ax.annotate(f"{mark.short} {p.speed_rpm:.0f}", (p.speed_rpm, 1.0), (0, 3), **place, **look)
 
 
 def multiplier_circle(branch: Branch, ax: Axes | None = None) -> Axes:
     """Multipliers along a branch, coloured by speed, with the unit circle; critical multipliers of its bifurcations are
     marked, filled where a stable orbit is on one side. Multipliers beyond 1.6 are not shown.
     """
-    ax = axes_or_new(ax, 7.0, 5.6)
-    ax.add_patch(Circle((0, 0), 1.0, fill=False, color=BLACK, linewidth=1.0, zorder=2))
+    ax = style.axes_or_new(ax, 7.0, 5.6)
+    ax.add_patch(Circle((0, 0), 1.0, fill=False, color=style.BLACK, linewidth=1.0, zorder=2))
     for line in (ax.axhline, ax.axvline):
-        line(0, color=GREY, linewidth=0.6, zorder=1)
+        line(0, color=style.GREY, linewidth=0.6, zorder=1)
     mu = branch.multipliers
     shown = (np.abs(np.real(mu)) <= REACH) & (np.abs(np.imag(mu)) <= REACH)
     speed = np.repeat(branch.speed_rpm, mu.shape[1]).reshape(mu.shape)
-    style = {"c": speed[shown], "s": 7, "cmap": "viridis", "linewidths": 0}
-    cloud = ax.scatter(np.real(mu)[shown], np.imag(mu)[shown], **style)
+    look = {"c": speed[shown], "s": 7, "cmap": "viridis", "linewidths": 0}
+    cloud = ax.scatter(np.real(mu)[shown], np.imag(mu)[shown], **look)
     cloud.set(clim=(float(speed.min()), float(speed.max())), zorder=3)
     beside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
     ax.figure.colorbar(cloud, cax=beside, label=quantity("speed_rpm").label, format="{x:.0f}")
     _mark_points(ax, branch.special, _critical)
     if branch.special:
-        legend_above(ax, size=8)
+        style.legend_above(ax, size=8)
     limits = (-REACH, REACH)
     ax.set(xlim=limits, ylim=limits, aspect="equal")
     ax.set(xlabel=r"Real part of the multiplier $\mu$", ylabel=r"Imaginary part of the multiplier $\mu$")

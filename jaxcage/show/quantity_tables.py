@@ -9,17 +9,17 @@ import xarray as xr
 from jaxtyping import Float
 
 from .._parameters import walk
-from ..analysis import Around, Measures, OrderSpectrum, failed, named_lines, scatter
+from ..analysis import Measures, failed, named_lines, scatter
 from ..bearing import Guidance, LoadDistribution, raceway_surface_speed, static_cage_displacement
 from ..files import configuration
-from ..forces import ImpactHistory
+from .run_figures import Rollers
 from .tables import SHOWN, Column, Table, rows_table, value_table
 
 
-SURE = 2.0
-"""Standard errors by which two means must differ."""
 LONGEST = 60
 """Characters of the words for a quantity in a table; longer ones give way to its name."""
+LINES = {"cage_place": "cage's vertical position over the clearance", "pocket_force": "pockets on cage, vertical [N]"}
+"""Words for the quantities that have a spectrum."""
 SHARES = ("cage_slip", "roller_slip_max")
 """Quantities without a unit that are read in per cent."""
 
@@ -64,49 +64,19 @@ def quantities_table(title: str, found: xr.Dataset, names: Sequence[str]) -> Tab
     return Table(title, columns, "means")
 
 
-def quantity_beside(name: str, cases: Sequence[str], found: Sequence[xr.Dataset]) -> Table:
-    """Means of a quantity of two designs at each speed, and where they differ beyond doubt."""
-    unit, shown = unit_of(found[0], name)
-    pairs = [mean_over_starts(each, name) for each in found]
-    (a, a_error), (b, b_error) = pairs
-    differs = np.abs(a - b) > SURE * np.hypot(a_error, b_error)
-    at = "shaft_rpm" if "shaft_rpm" in found[0].coords else "rpm"
-    columns = [Column("shaft [rpm]", found[0][at].values.tolist(), digits=0)]
-    for case, (mean, error) in zip(cases, pairs, strict=True):
-        columns.append(Column(case, mean.tolist(), unit, shown, error.tolist()))
-    title = head_of(name, unit)
-    return Table(title[:1].upper() + title[1:], [*columns, Column("differs", ["*" if d else "" for d in differs])])
-
-
-def measures_table(title: str, found: Measures) -> Table:
-    """Quantities of one run with their standard errors."""
+def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Table]:
+    """Quantities of one run with their standard errors; lines of spectra beside the bearing's frequencies."""
     words = lambda q: q.text if len(q.text) <= LONGEST else head_of(q.name, q.unit)
     rows = [(words(quantity), value, quantity.unit) for quantity, value, _ in found.values()]
-    return value_table(title, rows, [error for _, _, error in found.values()])
-
-
-def circumference_table(found: Around) -> Table:
-    """Slip, load and pocket force of the rollers around the bearing, an eighth of the circumference in a row."""
-    eighths = [np.floor(found.angle / (2 * np.pi) * 8).astype(int) == i for i in range(8)]
-    known = lambda f, x: [float(f(x[i])) if np.isfinite(x[i]).any() else math.nan for i in eighths]
-    columns = [Column("position, load at 270°", [f"{45 * i} to {45 * (i + 1)}°" for i in range(8)])]
-    columns.append(Column("slip", known(np.nanmean, found.roller_slip), "1", "%", digits=2))
-    for name, f in (("inner load", np.nanmean), ("driving force", np.nanmean), ("braking force", np.nanmean)):
-        columns.append(Column(name, known(f, getattr(found, name.replace(" ", "_"))), "N", digits=1))
-    columns.append(Column("largest force", known(np.nanmax, found.largest_force), "N", digits=0))
-    return Table("Rollers around the bearing: slip, load, pocket force", columns)
-
-
-def line_tables(spectra: Mapping[str, OrderSpectrum], orders: Mapping[str, float]) -> list[Table]:
-    """Lines of the spectra with the bearing's frequencies."""
-    words = {
-        "cage_place": "cage's vertical position over the clearance",
-        "pocket_force": "pockets on cage, vertical [N]",
-    }
+    tables = [value_table(title, rows, [error for _, _, error in found.values()])]
+    if rollers is None:
+        return tables
     columns = [Column("order of the cage's speed", (), key="order", digits=3), Column("amplitude", ())]
     columns.append(Column("at the frequency of", (), key="name"))
-    each = {name: map(vars, named_lines(found, orders)) for name, found in spectra.items()}
-    return [rows_table(f"Spectrum, {words[name]}", rows, columns, f"spectrum_{name}") for name, rows in each.items()]
+    for name, spectrum in rollers.spectra.items():
+        lines = map(vars, named_lines(spectrum, rollers.orders))
+        tables.append(rows_table(f"Spectrum, {LINES[name]}", lines, columns, f"spectrum_{name}"))
+    return tables
 
 
 def displacements(model: Any, shared: LoadDistribution) -> dict[str, float]:
@@ -142,26 +112,6 @@ def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed:
             ("centrifugal force of a roller", float(bearing.roller_centrifugal_force(shaft_speed)), "N"),
         ]
     return value_table(title, rows)
-
-
-def impact_table(title: str, history: ImpactHistory, approach_speed: float) -> tuple[Table, dict[str, Any]]:
-    """Peaks, time in contact and impulse of an impact over its whole history, as a table and for a document.
-
-    A bar that swings back may be hit again.
-    """
-    touching, bar = np.asarray(history.contact_force) > 0, np.asarray(history.bar_force)
-    duration = float(np.sum(touching)) * float(history.time[1] - history.time[0])
-    rows = {
-        "approach_speed": ("approach speed", approach_speed, "m/s"),
-        "peak_contact_force": ("peak contact force", float(np.max(history.contact_force)), "N"),
-        "peak_bar_force": ("peak bar force", float(np.max(bar)), "N"),
-        "lowest_bar_force": ("lowest bar force", float(np.min(bar)), "N"),
-        "contact_duration": ("time in contact", duration, "s"),
-        "contacts": ("contacts", int(np.sum(touching[1:] & ~touching[:-1])), "1"),
-        "impulse": ("impulse of the contact force", float(history.impulse), "N s"),
-        "ends_in_contact": ("still in contact at the end", bool(touching[-1]), "1"),
-    }
-    return value_table(title, rows.values()), {key: value for key, (_, value, _) in rows.items()}
 
 
 def differences(models: Sequence[Any]) -> list[dict[str, Any]]:

@@ -1,23 +1,17 @@
 """Style of the figures: colours that colour-blind readers can tell apart, thin frames, light grids, no global state.
 
-The colours are those of Okabe and Ito (https://jfly.uni-koeln.de/color), made for red-green blindness; the dark style
-lightens them and keeps their hues. Figures are drawn light; `restyle` changes them to the dark or the print style.
+The colours are those of Okabe and Ito (https://jfly.uni-koeln.de/color), made for red-green blindness.
 """
 
-from collections.abc import Iterable
-from typing import Any, Literal
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import Collection
-from matplotlib.colors import to_hex, to_rgb, to_rgba
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
-from matplotlib.text import Annotation, Text
 
 
 # Okabe and Ito's palette.
@@ -27,29 +21,6 @@ ZONE = "#F8EBC8"
 """Light amber behind chaotic zones, on which points keep their contrast."""
 GRID, BAND, PAPER = "#E6E6E6", "#F5F5F5", "#FFFFFF"
 RASTER_DPI = 200
-
-Style = Literal["light", "dark", "print"]
-STYLES: dict[Style, dict[str, str]] = {
-    "light": {},
-    "dark": {
-        BLUE: "#3E9BE0",
-        VERMILION: "#F2762B",
-        GREEN: "#12B886",
-        ORANGE: "#F4B942",
-        SKY: "#9AD6FF",
-        PURPLE: "#DE92BD",
-        BLACK: "#E8E8E8",
-        GREY: "#8C9199",
-        ZONE: "#3B3220",
-        GRID: "#2C3138",
-        BAND: "#1E2228",
-        PAPER: "#15181D",
-        "#000000": "#E8E8E8",
-    },
-    "print": {BLACK: "#000000", GREY: "#555555", ZONE: "#E4E4E4", GRID: "#D4D4D4", BAND: "#F0F0F0"},
-}
-"""Replacements of the light colours in each style; print is white paper, black ink and no amber."""
-PRINT_DPI, PRINT_LINES = 300, 1.25
 
 KIND_COLOURS = {
     "periodic": BLUE,
@@ -76,23 +47,28 @@ LINE_COLOURS = (BLUE, SKY, GREEN, PURPLE, VERMILION, ORANGE)
 """Colours of lines beside each other, such as those of initial states."""
 
 
-class Halo(withStroke):
-    """A rim in the colour of the paper around a line or a text, so that it can be read on any background."""
-
-    def __init__(self, width: float, colour: str = PAPER):
-        super().__init__(linewidth=width, foreground=colour)
-        self.width = width
+def halo(width: float) -> list[withStroke]:
+    """A rim in the colour of the paper around a line, so that it can be seen on any background."""
+    return [withStroke(linewidth=width, foreground=PAPER)]
 
 
-def lighter(colour: str, paper: str = PAPER) -> tuple[float, float, float]:
+def lighter(colour: str) -> tuple[float, float, float]:
     """The colour half way between `colour` and the paper."""
-    r, g, b = ((a + b) / 2 for a, b in zip(to_rgb(colour), to_rgb(paper), strict=True))
+    r, g, b = ((a + b) / 2 for a, b in zip(to_rgb(colour), to_rgb(PAPER), strict=True))
     return r, g, b
 
 
 def new_figure(width: float = 8.0, height: float = 5.0) -> Figure:
     """A figure that belongs to no window and no global list, and is freed with its last use."""
     return Figure(figsize=(width, height), layout="constrained", dpi=RASTER_DPI)
+
+
+def drawn(draw: Callable[[Axes], Any], width: float = 9.0, height: float = 5.0, title: str = "") -> Figure:
+    """A figure of one diagram, which `draw` draws on its axes."""
+    figure = new_figure(width, height)
+    draw(figure.subplots())
+    figure.suptitle(title, fontsize=11)
+    return figure
 
 
 def axes_or_new(ax: Axes | None, width: float = 7.0, height: float = 4.5) -> Axes:
@@ -165,67 +141,3 @@ def padded_limits(values: np.ndarray) -> tuple[float, float]:
     low, high = float(finite.min()), float(finite.max())
     pad = 0.05 * (high - low) or 0.1 * abs(high) or 1.0
     return low - pad, high + pad
-
-
-def restyle(figure: Figure, style: Style) -> Figure:
-    """Change the style of a drawn figure: each colour of this module becomes that of `style`; colour maps stay.
-
-    **Arguments:** a figure drawn by the functions of this package; `light`, `dark` or `print`.
-
-    **Returns:** the same figure.
-    """
-    if style == "light":
-        return figure
-    figure.draw_without_rendering()  # texts and ticks that are made on drawing
-    colours = _Exchange(STYLES[style])
-    for artist in _everything(figure):
-        colours.change(artist)
-    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):  # ticks that are still to come
-        axis.set_tick_params(color=colours.of(GREY), labelcolor=colours.of("#000000"), grid_color=colours.of(GRID))
-    if style == "print":
-        figure.set_dpi(PRINT_DPI)
-        for line in figure.findobj(Line2D):
-            line.set_linewidth(PRINT_LINES * line.get_linewidth())
-    return figure
-
-
-def _everything(figure: Figure) -> Iterable[Artist]:
-    for artist in figure.findobj():
-        yield artist
-        if isinstance(artist, Annotation) and artist.arrow_patch is not None:  # no child of its text
-            yield artist.arrow_patch
-
-
-class _Exchange:
-    """Replaces colours by others; those that are not listed stay."""
-
-    def __init__(self, table: dict[str, str]):
-        paper = table.get(PAPER, PAPER)
-        known = {PAPER: paper} | table
-        half = {to_hex(lighter(old)): to_hex(lighter(new, paper)) for old, new in table.items()}
-        self.table = {old.lower(): new for old, new in (half | known).items()}
-
-    def of(self, colour: Any) -> Any:
-        """The new colour for `colour`, with its transparency."""
-        if isinstance(colour, str) and colour in ("none", "auto"):
-            return colour
-        r, g, b, alpha = to_rgba(colour)
-        new = self.table.get(to_hex((r, g, b)))
-        return (r, g, b, alpha) if new is None else to_rgba(new, alpha)
-
-    def change(self, artist: Artist) -> None:
-        if isinstance(artist, Line2D):
-            artist.set(color=self.of(artist.get_color()))
-            artist.set(markerfacecolor=self.of(artist.get_markerfacecolor()))
-            artist.set(markeredgecolor=self.of(artist.get_markeredgecolor()))
-        elif isinstance(artist, Text):
-            artist.set_color(self.of(artist.get_color()))
-        elif isinstance(artist, Patch):
-            artist.set(facecolor=self.of(artist.get_facecolor()), edgecolor=self.of(artist.get_edgecolor()))
-        elif isinstance(artist, Collection) and artist.get_array() is None:
-            for name in ("facecolor", "edgecolor"):
-                colours = np.atleast_2d(getattr(artist, f"get_{name}")())
-                artist.set(**{name: [self.of(tuple(c)) for c in colours if len(c)]})
-        if any(isinstance(effect, Halo) for effect in artist.get_path_effects() or ()):
-            paper = to_hex(self.of(PAPER))
-            artist.set_path_effects([Halo(e.width, paper) for e in artist.get_path_effects() if isinstance(e, Halo)])

@@ -196,6 +196,11 @@ def value_table(title: str, rows: Iterable[tuple[str, Any, str]], errors: Sequen
     return Table(title, [words, Column("value", [c.cells[0] for c in each]), Column("unit", units, nothing="")])
 
 
+def counted(number: int, what: str) -> str:
+    """A number with the name of what it counts: `1 speed`, `3 speeds`."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
 def chosen(found: object, names: str) -> dict[str, Any]:
     """Some attributes of a result by name."""
     return {name: getattr(found, name) for name in names.split()}
