@@ -219,7 +219,7 @@ class OperatingRange:
             return f"the {' and '.join(lost)} edge is not located"
         self._anchors.append(anchor)
         for name in anchor.edges:
-            before, f = near.edges[name], edges.get(name)
+            f = edges.get(name)
             if (
                 f is None
                 or f.edge is None

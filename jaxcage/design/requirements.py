@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from .._errors import ArgumentError
 from .._parameters import parameter_info, parameters
 from ..models import AbstractForcedSystem
+from .objective import DesignSpace
 from .operating import OperatingRange, Value
 
 
@@ -94,7 +95,7 @@ def values_at(
         return found
     names = {r.of for r in wanted}
     if "balance" in names:
-        found["balance"] = _balance(range_, place)
+        found["balance"] = balance_grade(range_.space, range_.operating, place)
     if through := tuple(name for name in ("multiplier", "film", "land force", "drag") if name in names):
         worst = range_.worst(place, through)
         if isinstance(worst, str):
@@ -103,9 +104,9 @@ def values_at(
     return found
 
 
-def _balance(range_: OperatingRange, place: np.ndarray) -> Value:
-    """Balance grade at the largest speed [mm/s]."""
-    high, space = range_.operating[1], range_.space
+def balance_grade(space: DesignSpace, operating: tuple[float, float], place: np.ndarray) -> Value:
+    """Balance grade of a design at its largest speed [mm/s]."""
+    high = operating[1]
     slope = np.array([1e3 * high * span if n == "eccentricity" else 0.0 for n, span in zip(space.names, space.span)])
     return Value(1e3 * high * float(parameters(space.model(place))["eccentricity"]), slope, high * 30 / np.pi)
 

@@ -6,6 +6,7 @@ tolerances each requirement is kept by the worst bearing within them: its constr
 corner takes away, which the gradient names and a full solution at the corner measures, until both agree.
 """
 
+import abc
 import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -23,9 +24,10 @@ from ..models import AbstractForcedSystem
 from ..solve import AbstractMethod
 from .check import Checked, check_design
 from .objective import DesignSpace
-from .operating import Designs, OperatingRange, Value, function_value
-from .requirements import Cost, Requirement, Requirements, cost_function, listed, values_at
+from .operating import OperatingRange, Value, function_value
+from .requirements import Cost, Requirement, Requirements, balance_grade, cost_function, listed, values_at
 from .tolerance import Budget, Tolerance, budget_of, corner, widened
+from .unstable_width import UnstableWidth
 
 
 LOST = 10.0  # slack of every requirement, negative, at a trial that has no values
@@ -99,40 +101,35 @@ class Design:
         return "\n".join(rows)
 
 
-class _Problem:
+class _Problem(abc.ABC):
     """Trials of one search, each computed once."""
 
-    def __init__(self, range_: OperatingRange, wanted: list[Requirement], cost: Callable[[Any], Any], free: np.ndarray):
-        self.range, self.wanted, self.cost, self.free = range_, wanted, cost, free
-        self.designs = Designs.of(range_.space)
+    def __init__(self, space: DesignSpace, operating: tuple[float, float], wanted: list[Requirement], free: np.ndarray):
+        self.space, self.operating, self.wanted, self.free = space, operating, wanted, free
         self.tightened = np.zeros(len(wanted))
         self.trials: dict[bytes, Trial] = {}
+        self.notes: list[str] = []
+
+    @abc.abstractmethod
+    def compute(self, place: np.ndarray) -> Trial:
+        """The trial at a place."""
+
+    def foreseen(self, trial: Trial, place: np.ndarray) -> tuple[float, np.ndarray]:
+        """The cost near a trial and its derivatives, to first order where it is dear to compute."""
+        return trial.cost + float(trial.cost_slope @ (place - trial.place)), trial.cost_slope
 
     def at(self, place: np.ndarray) -> Trial:
         """The trial at a place."""
         place = np.asarray(place, dtype=float)
         key = place.tobytes()
         if key not in self.trials:
-            self.trials[key] = self._computed(place)
+            self.trials[key] = self.compute(place)
         return self.trials[key]
 
-    def cost_at(self, place: np.ndarray) -> tuple[float, np.ndarray]:
-        """Cost and its derivatives at a place."""
-        value, slope = function_value(self.cost, self.designs, jnp.asarray(place))
-        return float(value), np.asarray(slope)
-
-    def _computed(self, place: np.ndarray) -> Trial:
-        cost, slope = self.cost_at(place)
-        before = len(self.range.handed_over)
-        values = values_at(self.range, place, self.wanted)
+    def nowhere(self, place: np.ndarray, cost: float, slope: np.ndarray, why: str) -> Trial:
+        """A trial at which an edge is lost."""
         m, n = len(self.wanted), place.size
-        pairs = [] if isinstance(values, str) else [r.slack(values[r.of]) for r in self.wanted]
-        if pairs and len(self.range.handed_over) > before and min(s for s, _ in pairs[:2]) < -KEPT:
-            values = "; ".join(self.range.handed_over[before:])  # a jump to the wrong side, where no slope leads back
-            self.range.forget(place)
-        if isinstance(values, str):
-            return Trial(place, cost, slope, np.full(m, -LOST), np.zeros((m, n)), {}, values)
-        return Trial(place, cost, slope, np.array([s for s, _ in pairs]), np.array([d for _, d in pairs]), values)
+        return Trial(place, cost, slope, np.full(m, -LOST), np.zeros((m, n)), {}, why)
 
     def whole(self, x: np.ndarray, like: np.ndarray) -> np.ndarray:
         """The place of the parameters that vary, the others as they are at `like`."""
@@ -145,6 +142,51 @@ class _Problem:
         return self.at(place).slack - self.tightened
 
 
+class _CostProblem(_Problem):
+    """Requirements over an operating range, and a cost that is cheap to compute."""
+
+    def __init__(self, range_: OperatingRange, wanted: list[Requirement], cost: Callable[[Any], Any], free: np.ndarray):
+        super().__init__(range_.space, range_.operating, wanted, free)
+        self.range, self.cost, self.notes = range_, cost, range_.handed_over
+
+    def foreseen(self, trial: Trial, place: np.ndarray) -> tuple[float, np.ndarray]:
+        value, slope = function_value(self.cost, self.range.designs, jnp.asarray(place))
+        return float(value), np.asarray(slope)
+
+    def compute(self, place: np.ndarray) -> Trial:
+        value, slope = function_value(self.cost, self.range.designs, jnp.asarray(place))
+        before = len(self.notes)
+        values = values_at(self.range, place, self.wanted)
+        pairs = [] if isinstance(values, str) else [r.slack(values[r.of]) for r in self.wanted]
+        if pairs and len(self.notes) > before and min(s for s, _ in pairs[:2]) < -KEPT:
+            values = "; ".join(self.notes[before:])  # a jump to the wrong side, where no slope leads back
+            self.range.forget(place)
+        if isinstance(values, str):
+            return self.nowhere(place, float(value), np.asarray(slope), values)
+        slack, by = (np.array(x) for x in zip(*pairs, strict=True))
+        return Trial(place, float(value), np.asarray(slope), slack, by, values)
+
+
+class _WidthProblem(_Problem):
+    """The width of unstable ranges, and a balance grade as the only requirement."""
+
+    def __init__(self, width: UnstableWidth, keep: Requirements, free: np.ndarray):
+        if others := [n for n in ("decay", "film", "land_force", "drag") if getattr(keep, n) is not None]:
+            raise ArgumentError("keep", said=f"must have no {others[0]} where the width is the objective.")
+        wanted = [r for r in listed(keep, width.space.system) if r.of == "balance"]
+        super().__init__(width.space, width.operating, wanted, free)
+        self.width = width
+
+    def compute(self, place: np.ndarray) -> Trial:
+        found = self.width.at(place)
+        if isinstance(found, str):
+            return self.nowhere(place, float("inf"), np.zeros(place.size), found)
+        values = {"width": found} | {r.of: balance_grade(self.space, self.operating, place) for r in self.wanted}
+        pairs = [r.slack(values[r.of]) for r in self.wanted]
+        slack, by = np.array([s for s, _ in pairs]), np.array([d for _, d in pairs]).reshape(-1, place.size)
+        return Trial(place, found.value, found.slope, slack, by, values)
+
+
 def design_for(
     model: AbstractForcedSystem,
     operating: tuple[float, float],
@@ -152,6 +194,7 @@ def design_for(
     keep: Requirements = Requirements(),
     cost: Cost | None = None,
     *,
+    objective: str = "cost",
     tolerance: Mapping[str, Tolerance] | None = None,
     search: str = "slsqp",
     starts: int = 1,
@@ -170,6 +213,8 @@ def design_for(
     - `keep`: what must hold over the range.
     - `cost`: prices by parameter name, or a function of the design that JAX differentiates; by default prices of
         turning and balancing (`COSTS`).
+    - `objective`: `cost`, or `width`: the exact width of the unstable ranges within `operating`, whose margins are then
+        no requirement, and of the others only `balance` may be given.
     - `tolerance`: what manufacture makes of parameters, varied or not; every requirement then holds for the worst.
     - `search`: `slsqp`, or `augmented` for optax's Adam on an augmented Lagrangian.
     - `starts`, `seed`: searches, the first from the design itself, others from quasi-random places.
@@ -182,6 +227,8 @@ def design_for(
     require_x64()
     require_at_least(1, starts=starts)
     require_at_least(0, check=check)
+    if objective not in ("cost", "width"):
+        raise ArgumentError("objective", said=f"must be cost or width, but '{objective}' was given.")
     if search not in SEARCHES:
         raise ArgumentError("search", said=f"must be one of {', '.join(SEARCHES)}, but '{search}' was given.")
     low, high = operating
@@ -192,9 +239,11 @@ def design_for(
     free = np.array([name in vary for name in space.names])
     say = progress or (lambda what, done, of: None)
     say("edges of the given design", 0, 1)
-    problem = _Problem(
-        OperatingRange(space, operating, keep.margin, method), listed(keep, model), cost_function(cost, model), free
-    )
+    if objective == "width":
+        problem: _Problem = _WidthProblem(UnstableWidth(space, operating, method), keep, free)
+    else:
+        range_ = OperatingRange(space, operating, keep.margin, method)
+        problem = _CostProblem(range_, listed(keep, model), cost_function(cost, model), free)
     own = np.where(free, np.clip(space.place, 0, 1), space.place)
     count, found = int(free.sum()), []
     places = [own] + [problem.whole(x, own) for x in sobol(count, max(starts, 2), seed)[: starts - 1]]
@@ -215,7 +264,7 @@ def design_for(
 def _merit(problem: _Problem, place: np.ndarray, tightened: np.ndarray) -> tuple[float, float]:
     """Order of designs: by what they fall short, then by cost."""
     trial = problem.at(place)
-    short = float(np.max(np.maximum(tightened - trial.slack - KEPT, 0)))
+    short = float(np.max(np.maximum(tightened - trial.slack - KEPT, 0), initial=0.0))
     return short, trial.cost
 
 
@@ -225,14 +274,14 @@ def _merit(problem: _Problem, place: np.ndarray, tightened: np.ndarray) -> tuple
 def _programme(problem: _Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
     """The best place by sequential programmes within a trust region.
 
-    Each programme has the cost itself, which is cheap, and the requirements linearised with their exact derivatives, and
-    is solved by SciPy's SLSQP. Its step is one solution of the edges; a step that loses an edge, or gains less than a
+    Each programme has the cost itself, where it is cheap, and the requirements linearised with their exact derivatives;
+    SciPy's SLSQP solves it. Its step is one solution of the edges; a step that loses an edge, or gains less than a
     tenth of what was foreseen, is halved. What the worst requirement falls short is bought at a price that outweighs
     the cost, so that the search leads to a feasible place or, where there is none, to the least shortfall.
     """
     trial, radius, largest = problem.at(begin), FIRST_RADIUS, LARGEST_RADIUS
     size = max(abs(trial.cost), 1e-12)
-    short = lambda t: max(0.0, -float(np.min(t.slack - problem.tightened)))
+    short = lambda t: max(0.0, -float(np.min(t.slack - problem.tightened, initial=np.inf)))
     merit = lambda t: t.cost / size + PENALTY * short(t)
     for turn in range(ITERATIONS):
         step, foreseen = _step(problem, trial, radius, size)
@@ -259,12 +308,12 @@ def _step(problem: _Problem, trial: Trial, radius: float, size: float) -> tuple[
     bounds = [(max(-radius, -v), min(radius, 1 - v)) for v in x]
 
     def cost(z: np.ndarray) -> tuple[float, np.ndarray]:
-        value, by = problem.cost_at(problem.whole(x + z[:-1], trial.place))
+        value, by = problem.foreseen(trial, problem.whole(x + z[:-1], trial.place))
         return value / size + PENALTY * z[-1], np.append(by[problem.free] / size, 0.0) + last
 
     found = minimize(
         cost,
-        np.append(np.zeros(x.size), max(0.0, -float(slack.min()))),
+        np.append(np.zeros(x.size), max(0.0, -float(np.min(slack, initial=np.inf)))),
         jac=True,
         method="SLSQP",
         bounds=[*bounds, (0, None)],
@@ -276,8 +325,8 @@ def _step(problem: _Problem, trial: Trial, radius: float, size: float) -> tuple[
         options={"ftol": 1e-9, "maxiter": 100},
     )
     step = np.clip(found.x[:-1], *np.array(bounds).T)
-    short = max(0.0, -float(np.min(slack + slope @ step)))
-    return step, problem.cost_at(problem.whole(x + step, trial.place))[0] / size + PENALTY * short
+    short = max(0.0, -float(np.min(slack + slope @ step, initial=np.inf)))
+    return step, problem.foreseen(trial, problem.whole(x + step, trial.place))[0] / size + PENALTY * short
 
 
 def _augmented(problem: _Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
@@ -316,7 +365,7 @@ def _taken_by_corners(
     trial = problem.at(place)
     taken = np.zeros(len(problem.wanted))
     for i in range(len(problem.wanted)):
-        there = problem.at(corner(problem.range.space, place, trial.slack_slope[i], tolerance))
+        there = problem.at(corner(problem.space, place, trial.slack_slope[i], tolerance))
         taken[i] = trial.slack[i] - there.slack[i]
     return np.maximum(taken, 0.0)
 
@@ -329,7 +378,7 @@ def _multipliers(
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " n"]]:
     """Lagrange multipliers of the requirements that bind and of the bounds, for a gradient of the objective."""
     slack = problem.slack(trial.place)
-    binding = np.flatnonzero(slack < ACTIVE + max(0.0, -float(slack.min())))
+    binding = np.flatnonzero(slack < ACTIVE + max(0.0, -float(np.min(slack, initial=np.inf))))
     x, free = trial.place[problem.free], trial.slack_slope[:, problem.free]
     low, high = np.flatnonzero(x < 1e-6), np.flatnonzero(x > 1 - 1e-6)
     unit = np.eye(x.size)
@@ -349,7 +398,7 @@ def _described(
     say: Callable[[str, int, int], None],
 ) -> Design:
     """All that is known of the best place."""
-    space, wanted = problem.range.space, problem.wanted
+    space, wanted = problem.space, problem.wanted
     trial, own = problem.at(best), problem.at(space.place)
     names = np.array(space.names)[problem.free]
     slack = problem.slack(best)
@@ -378,11 +427,11 @@ def _described(
         else []
     )
     model = space.model(best)
-    checked = check_design(model, problem.range.operating, check, say) if check and not trial.lost else None
+    checked = check_design(model, problem.operating, check, say) if check and not trial.lost else None
     changed = {n: float(v) for n, v in space.values(best).items() if n in names}
     path = [space.values(t.place) | {"cost": t.cost} for t in problem.trials.values() if not t.lost]
     return Design(
         *(model, changed, trial.cost, own.cost, wanted, own.values, trial.values, feasible, short, conflict, prices),
-        *(at_bound, corners, budget, tuple(dict.fromkeys(problem.range.handed_over)), len(problem.trials), path),
+        *(at_bound, corners, budget, tuple(dict.fromkeys(problem.notes)), len(problem.trials), path),
         checked,
     )
