@@ -10,10 +10,8 @@ held the truth.
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Bool, Float
 
 from .._arguments import require_at_least
@@ -23,7 +21,7 @@ from ..files import Measurement, Range, Unknown
 from ..lanes import Progress, sobol
 from ..models import CageModel
 from ..solve import AbstractMethod, native
-from .chances import ERROR, draw, run_draws
+from .chances import ERROR, run_draws
 from .loads import motions
 
 
@@ -166,19 +164,15 @@ def misses(
 ) -> Float[np.ndarray, "draws measurements"]:
     """Distance of each draw from each measurement, in tolerances; NaN where it failed. A cage that is chaotic rattles:
     its distance is 0 if that is right, else `FAR`."""
-    models = draw(model, unknowns, place)
     rpm = np.unique([m.cage_rpm for m in measured])
-    found = run_draws(models, rpm * np.pi / 30, method, progress)
-    lost, rattles = (np.array([of(each) for each in found]) for of in (lambda each: failed(each)[:, 0], restless))
-    moved: Any = None
-    if any(m.quantity in ("orbit size", "whirl frequency") for m in measured):
-        moved = motions(models, xr.concat(found, "design"), method=native(error=ERROR))
+    models, found = run_draws(model, unknowns, place, rpm * np.pi / 30, method=method, progress=progress)
+    moved = motions(models, found, method=native(error=ERROR))
     columns = []
     for m in measured:
         i = int(np.argmin(np.abs(rpm - m.cage_rpm)))
         if m.quantity in ("rattles", "calm"):
-            right = rattles[:, i] == (m.quantity == "rattles")
-            columns.append(np.where(lost[:, i], np.nan, np.where(right, 0.0, FAR)))
+            right = restless(found)[:, i] == (m.quantity == "rattles")
+            columns.append(np.where(failed(found)[:, i, 0], np.nan, np.where(right, 0.0, FAR)))
             continue
         whirl = m.quantity == "whirl frequency"
         value = np.abs(moved.whirl_order[:, i, 0]) * m.cage_rpm / 60 if whirl else moved.size[:, i, 0]
