@@ -32,7 +32,7 @@ def test_a_search_finds_a_known_optimum(vary: dict[str, tuple[float, float]]):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_search_among_many_valleys_beats_as_many_even_draws(seed: int):
     """Rastrigin's function of four parameters; the draws are those of the same Sobol sequence."""
-    names = ("damping", "cubic", "stiffness", "force")
+    names = ("damping", "cubic", "stiffness", "forcing")
     vary = {n: (0.2, 2.2) for n in names}
     waves = lambda x: 10.0 + x**2 - 10 * jnp.cos(2 * jnp.pi * x)
     height = by_parameters(lambda p: 1.0 + sum(waves(p[n] - 1.4) for n in names))
@@ -67,17 +67,15 @@ def test_a_bound_that_stops_the_search_is_named():
     assert found.at_bound == ("damping",) and found.values["damping"] <= 1.0 and "at bound" in str(found)
 
 
-@pytest.mark.wide
 def test_sobol_indices_of_ishigami():
     """Ishigami and Homma's function, a = 7, b = 0.1: first 0.3139, 0.4424, 0, total 0.5576, 0.4424, 0.2437."""
-    names = ("damping", "cubic", "stiffness")
-    vary = {n: (0.5, 1.5) for n in names}
+    names = ("x", "y", "z")
 
-    def ishigami(p):
-        x = [2 * np.pi * (float(p[n]) - 1.0) for n in names]
-        return np.sin(x[0]) + 7 * np.sin(x[1]) ** 2 + 0.1 * x[2] ** 4 * np.sin(x[0])
+    def ishigami(place):
+        x, y, z = np.pi * (2 * place.T - 1)
+        return np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
 
-    find = lambda: jc.design.global_sensitivity(double_well(), vary, by_parameters(ishigami), samples=4096)
+    find = lambda: jc.design.sobol_of(ishigami, names, samples=4096)
     got = find()
     assert list(got.first.values()) == pytest.approx([0.3139, 0.4424, 0.0], abs=0.02)
     assert list(got.total.values()) == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.02)
@@ -92,8 +90,8 @@ def test_a_parameter_that_changes_nothing_and_scatter_of_the_motion():
     cubic = by_parameters(lambda p: p["cubic"])
     values = lambda models: cubic(models)[:, None] + np.sqrt(0.5) * rng.normal(size=(len(models), 2))
     vary = {"cubic": (0.5, 1.5), "damping": (0.1, 0.5)}
-    got = jc.design.global_sensitivity(double_well(), vary, values, samples=1024)
-    assert got.scatter == pytest.approx(0.75, abs=0.06) and got.first["cubic"] == pytest.approx(0.25, abs=0.1)
+    got = jc.design.global_sensitivity(double_well(), vary, values, samples=256)
+    assert got.scatter == pytest.approx(0.75, abs=0.1) and got.first["cubic"] == pytest.approx(0.25, abs=0.15)
     still = jc.design.global_sensitivity(double_well(), vary, cubic, samples=8)
     assert still.total["damping"] == 0.0 == still.first["damping"] and still.total_interval["damping"] == (0.0, 0.0)
 

@@ -77,7 +77,10 @@ def design(
         else:
             prices = {"cost": 1e3 if cost is None else cost}
             ends = runs.speed[0] * RPM, runs.speed[-1] * RPM
-            objective, compared = d.chaotic_width(*ends, price=prices["cost"]), {"chaotic speeds": d.chaotic_width(*ends)}
+            objective, compared = (
+                d.chaotic_width(*ends, price=prices["cost"]),
+                {"chaotic speeds": d.chaotic_width(*ends)},
+            )
         names = subject.usual((d.BALANCE, *d.LAND_LOADS), d.COMPARED)
         compared |= {name: d.statistic(model, name) for name in names} | {d.OBJECTIVE: objective}
         length = {"batches": steps or subject.usual(10, 12), "batch": batch or subject.usual(12, 16)}

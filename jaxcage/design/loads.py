@@ -50,7 +50,7 @@ def _ended(
 def _read(form: Form, several: bool, speed: Array, rows: Any, states: Array) -> Float[Array, "lanes n 3"]:
     """Contact force of the land on the cage [N], power to shear the film [W], and distance of the cage's centre from
     that of its guide [m]."""
-    tau = jnp.arange(states.shape[1]) * (REVOLUTION / SAMPLES)
+    tau = jnp.arange(states.shape[1], dtype=float) * (REVOLUTION / SAMPLES)
 
     def at(model: CageModel, speed: Array, tau: Array, y: Array) -> Array:
         q, v = jnp.split(y, 2)
