@@ -64,10 +64,10 @@ def lasting(found: xr.Dataset) -> Bool[np.ndarray, " speeds"]:
     return np.array([c and survival_at(found, i).mean_life >= horizon for i, c in enumerate(chaotic)], dtype=bool)
 
 
-def chaotic_share(found: xr.Dataset) -> Float[np.ndarray, "*speeds"]:
+def chaotic_share(found: xr.Dataset) -> Float[np.ndarray, " speeds"]:
     """Share of the finished lanes at each speed that are chaotic while observed; NaN where every lane failed."""
-    finished = np.sum(~failed(found), axis=-1)
-    chaotic = np.sum(np.isin(found["label"].values, ("chaotic", "transient")), axis=-1)
+    finished = np.sum(~failed(found), axis=1)
+    chaotic = np.sum(np.isin(found["label"].values, ("chaotic", "transient")), axis=1)
     return np.where(finished > 0, chaotic / np.maximum(finished, 1), np.nan)
 
 

@@ -114,7 +114,7 @@ def _runs(subject: Subject, over: o.Range, means: o.MeanOptions, seed: int, prog
     if subject.with_rollers:
         length = means.length(starts=4, discard=10, revolutions=20)
         return jc.design.Runs.of_bearing(subject.speed(means.speed), **length, seed=seed, progress=progress)
-    length = means.length(starts=1, discard=150, revolutions=100)
+    length: dict[str, Any] = means.length(starts=1, discard=150, revolutions=100)
     return jc.design.Runs(subject.range(over, 48), **length, progress=progress)
 
 
@@ -197,7 +197,7 @@ def unknowns(
     case: o.Case,
     *,
     over: o.Range = o.Range(),
-    samples: o.FromTwo = 16,
+    draws: o.FromTwo = 128,
     seed: o.Seed = 0,
     steps: o.StepOptions = o.StepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
@@ -205,27 +205,18 @@ def unknowns(
     """The measurement that would decide: shares of each range of a TOML file in the chaotic speeds, by default of 8.
 
     Args:
-        samples: Base samples of the Sobol indices, a power of 2.
+        draws: Draws from the ranges.
     """
     subject = read_case(case)
     subject.require_ranges()
-    at, info, labels = subject.range(over, 8), jc.parameter_info(subject.model), [u.label for u in subject.unknowns]
+    at = subject.range(over, 8)
     with show.computing(f"unknowns {subject.name}") as say:
-        told = {"method": steps.method, "progress": partial(say, "draws")}
-        share = partial(jc.design.chaotic_shares, subject.model, subject.unknowns, at, **told)
-        found = jc.design.sobol_of(share, labels, samples=_power(samples), seed=seed)
-    sources = {u.label: info[u.names[0]].source for u in subject.unknowns}
-    most = max(found.total, key=found.total.__getitem__)
-    said = f"Measure {most} first: {sources[most]}."
-    if not any(found.total.values()):
-        said = "Nothing to decide: every draw does the same."
-    elif most in found.doubtful:
-        said = "These draws do not tell what to measure first."
-    document = {"designs": found.evaluations, "doubtful": found.doubtful, "speeds_rpm": at * RPM}
-    document["measure"] = {"what": most, "how": sources[most]}
-    notes = [*([found.warning] if found.warning else []), *(f"{label}: {how}" for label, how in sources.items())]
-    table = jc.show.sobol_table(f"Chaotic share of {subject.name}", found)
-    return Answer(said, [table], notes, document, subject.certain)
+        given = {"draws": draws, "seed": seed, "method": steps.method, "progress": partial(say, "draws")}
+        found = jc.design.ensemble(subject.model, subject.unknowns, at, **given)
+    clues = found.clues(np.ones(at.size, dtype=bool))
+    said = jc.show.measures_words(clues) if clues else "Nothing to decide: every draw does the same."
+    document = {"draws": draws, "failed": int(np.sum(found.failed)), "speeds_rpm": found.rpm}
+    return Answer(said, [jc.show.unknowns_table(found, clues)], [], document, subject.certain)
 
 
 def identify(
@@ -253,11 +244,12 @@ def identify(
         jc.parameter_info(subject.model),
     )
     with show.computing(f"identify {subject.name}") as say:
-        given = {"draws": draws, "stages": stages, "seed": seed, "method": steps.method}
-        found = jc.design.identify(subject.model, subject.unknowns, rows, **given, progress=partial(say, "draws"))
+        told = {"method": steps.method, "progress": partial(say, "draws")}
+        missed = lambda place: jc.design.misses(subject.model, subject.unknowns, rows, place, **told)
+        found = jc.design.narrow(subject.unknowns, missed, draws=draws, stages=stages, seed=seed)
     tables = [jc.show.measured_table(found, rows, subject.beside)]
     document = {name: getattr(found, name) for name in ("draws", "stages", "accepted")}
-    if not found.met:
+    if not found.accepted:
         worst = max(tables[0].records, key=lambda row: row["off_by_tolerances"])
         off = f"{worst['off_by_tolerances']:.2g} tolerances off in '{worst['what']}'"
         why = f"None of {found.draws} draws does what was measured in all rows: the nearest is {off}."

@@ -15,16 +15,14 @@
 from .._arguments import check_layer
 from .chances import (
     REVOLUTIONS as REVOLUTIONS,
-    Band as Band,
     Clue as Clue,
     Ensemble as Ensemble,
     binomial_interval as binomial_interval,
-    chaotic_shares as chaotic_shares,
     ensemble as ensemble,
     verdict_of as verdict_of,
 )
-from .identification import Narrowed as Narrowed, identify as identify, misses as misses, narrow as narrow
-from .loads import LAND_LOADS as LAND_LOADS, Motion as Motion, land_loads as land_loads, motions as motions
+from .identification import Narrowed as Narrowed, misses as misses, narrow as narrow
+from .loads import LAND_LOADS as LAND_LOADS, land_loads as land_loads, motions as motions
 from .paired_designs import (
     DIRECTIONS as DIRECTIONS,
     MeanGradient as MeanGradient,

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
-from ..analysis import chaotic_share, failed, restless, zones
+from ..analysis import failed, restless
 from ..files import Unknown, check_together
 from ..lanes import Progress, sobol, sweep
 from ..models import CageModel
@@ -40,14 +40,6 @@ BINS = 4
 Verdict = Literal["calm", "chaotic", "calm as computed", "chaotic as computed", "not decided", "too few draws"]
 
 
-class Band(NamedTuple):
-    """Speeds [rpm] below which 5 %, 50 % and 95 % of an edge lie, among the `share` of the draws that have it."""
-
-    name: str
-    share: float
-    rpm: tuple[float, float, float]
-
-
 class Clue(NamedTuple):
     """Share of the variance of the chaotic share that is due to an unknown alone, and `source`, how to measure it."""
 
@@ -70,7 +62,6 @@ class Ensemble:
     chaotic: Bool[np.ndarray, "draws speeds"]
     """True where a draw is chaotic while observed."""
     failed: Bool[np.ndarray, "draws speeds"]
-    bands: tuple[Band, ...]
     discard: int
     revolutions: int
     units: tuple[str, ...] = ()
@@ -219,26 +210,4 @@ def ensemble(
     _, found = run_draws(model, unknowns, place, speeds, method=method, progress=progress, **length)
     rough, lost, at = restless(found), failed(found)[..., 0], np.asarray(speeds, dtype=float)
     sources, units = zip(*((info[u.names[0]].source, info[u.names[0]].unit) for u in unknowns), strict=True)
-    return Ensemble(tuple(unknowns), sources, place, at, rough, lost, _bands(found), discard, revolutions, units)
-
-
-def chaotic_shares(
-    model: CageModel, unknowns: Sequence[Unknown], speeds: Float[np.ndarray, " speeds"], place: np.ndarray, **how: Any
-) -> Float[np.ndarray, " draws"]:
-    """Share of the speeds at which each draw is chaotic; a lane that failed counts as the others of its draw do."""
-    _, found = run_draws(model, unknowns, place, speeds, **how)
-    shares = chaotic_share(found)
-    known = np.isfinite(shares)
-    return np.sum(shares, axis=1, where=known) / np.maximum(known.sum(axis=1), 1)
-
-
-def _bands(found: xr.Dataset) -> tuple[Band, ...]:
-    """Where the ends of the first two zones of each draw are."""
-    places: dict[str, list[float]] = {f"zone {i} {end}": [] for i in (1, 2) for end in ("onset", "exit")}
-    for k in range(found.sizes["design"]):
-        for i, zone in enumerate(zones(found.isel(design=k)).zones[:2], start=1):
-            for end, edge in (("onset", zone.onset), ("exit", zone.exit)):
-                if edge is not None:
-                    places[f"zone {i} {end}"].append(edge.speed_rpm)
-    of, levels = found.sizes["design"], (0.05, 0.5, 0.95)
-    return tuple(Band(name, len(x) / of, tuple(np.quantile(x, levels).tolist())) for name, x in places.items() if x)
+    return Ensemble(tuple(unknowns), sources, place, at, rough, lost, discard, revolutions, units)

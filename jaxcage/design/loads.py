@@ -5,7 +5,6 @@ sliding distance s and a specific wear rate k of the two surfaces and their oil.
 for every design; a design changes the mean of N times the sliding speed.
 """
 
-import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
@@ -88,30 +87,23 @@ def land_loads(
     return {name: x.reshape(found["last"].shape[:-1]) for name, x in each}
 
 
-@dataclasses.dataclass(frozen=True)
-class Motion:
-    """Motion of the cage centre relative to its rib in each lane of a sweep; NaN where a lane failed."""
-
-    size: Float[np.ndarray, "*lanes"]
-    """From one end to the other [m], as a probe reads it, the larger of horizontal and vertical."""
-    whirl_order: Float[np.ndarray, "*lanes"]
-    """Order of the largest line in the spectrum of x + i y, a multiple of the cage speed: negative where it whirls
-    against the rotation; NaN where the centre stands still."""
-
-
-def motions(models: CageModel | Sequence[CageModel], found: xr.Dataset, method: AbstractMethod | None = None) -> Motion:
-    """The motion over revolutions that go on from the end of a sweep.
+def motions(
+    models: CageModel | Sequence[CageModel], found: xr.Dataset, method: AbstractMethod | None = None
+) -> tuple[Float[np.ndarray, "*lanes"], Float[np.ndarray, "*lanes"]]:
+    """Size and whirl of the motion of the cage centre relative to its rib, in each lane of a sweep.
 
     **Arguments:** model or designs, and their sweep; integration method, by default `jaxcage.native()`.
 
-    **Returns:** the motion over the axes of the sweep; NaN where a lane is not known to the method's error.
+    **Returns:** size [m] from one end to the other, as a probe reads it, the larger of horizontal and vertical; order
+    of the largest line in the spectrum of x + i y, a multiple of the cage speed, negative where it whirls against the
+    rotation, NaN where the centre stands still. Both are NaN where a lane is not known to the method's error.
     """
     chosen, (lanes, last, *_) = native() if method is None else method, _ended(models, found)
     seen, error = histories(lanes, last, MOTION_SAMPLES, MOTION_REVOLUTIONS, chosen)
     state = np.where((error <= chosen.allowed)[:, None, None], seen, np.nan)
     q = state[..., :2] if last.shape[1] == 4 else state[..., :2] - state[..., 2:4]
     order = np.array([_order(x + 1j * y) for x, y in np.moveaxis(q, 2, 1)])
-    return Motion(*(x.reshape(found["label"].shape) for x in (np.ptp(q, axis=1).max(axis=1), order)))
+    return np.ptp(q, axis=1).max(axis=1).reshape(found["label"].shape), order.reshape(found["label"].shape)
 
 
 def _order(path: Complex[np.ndarray, " samples"]) -> float:

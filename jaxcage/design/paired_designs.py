@@ -51,15 +51,10 @@ class StatisticGradient:
     directions: tuple[str, ...]
     by_relative_change: Float[np.ndarray, " n"]
     """Derivative of the value by the logarithm of each parameter [unit]."""
-    covariance: Float[np.ndarray, "n n"]
-    """Covariance of those derivatives."""
+    by_relative_change_error: Float[np.ndarray, " n"]
+    """Standard error of each derivative."""
     explained: float
     """Share of the scatter of the pairs that the slopes explain, 0 to 1."""
-
-    @property
-    def by_relative_change_error(self) -> Float[np.ndarray, " n"]:
-        """Standard error of each derivative."""
-        return np.sqrt(np.diag(self.covariance))
 
     @property
     def elasticity(self) -> Float[np.ndarray, " n"]:
@@ -91,18 +86,13 @@ class MeanGradient:
     """Number of designs that failed, and are left out with their partners."""
     inaccurate: int
     """Number of lanes that are `inaccurate`, which count."""
-    spread: float
-    runs: Runs
 
     def slope(self, statistic: str, parameter: str) -> tuple[float, float]:
         """Derivative by one parameter that changes alone [unit of the statistic per SI unit], with its standard error.
 
-        **Raises:** `ValueError` for a statistic or parameter that is not there.
+        **Raises:** `ValueError` for a parameter that does not change alone.
         """
-        found = self.statistics.get(statistic)
-        if found is None:
-            said = f"must be one of {', '.join(self.statistics)}, but '{statistic}' was given."
-            raise ArgumentError("statistic", said=said)
+        found = self.statistics[statistic]
         alone = [name for name in found.directions if "+" not in name]
         if parameter not in alone:
             raise ArgumentError("parameter", said=f"must be one of {', '.join(alone)}, but '{parameter}' was given.")
@@ -110,8 +100,7 @@ class MeanGradient:
         return float(found.by_relative_change[i] / value), float(found.by_relative_change_error[i] / abs(value))
 
     def __str__(self) -> str:
-        rpm = ", ".join(f"{speed * 30 / math.pi:.0f}" for speed in self.runs.speed.tolist())
-        lines = [f"{rpm} rpm, elasticities from {self.pairs} pairs of designs"]
+        lines = [f"Elasticities from {self.pairs} pairs of designs"]
         for each in self.statistics.values():
             lines.append(f"{each.name} {each.value:.4g} +- {each.value_error:.2g} {each.unit}")
             rows = zip(each.directions, each.elasticity, each.elasticity_error, strict=True)
@@ -171,7 +160,7 @@ def mean_gradient(
         said = f"must be more: only {whole.sum()} pairs came to their ends, for {len(directions)} slopes."
         raise ArgumentError("designs", said=said)
     pairs = {name: blocks.reshape(2, designs // 2, -1)[:, whole] for name, blocks in found.items()}
-    about = int(whole.sum()), int(failed.sum()), int((swept["outcome"] == "inaccurate").sum()), spread, runs
+    about = int(whole.sum()), int(failed.sum()), int((swept["outcome"] == "inaccurate").sum())
     fit = lambda name: gradient_of_pairs(name, chosen[name].unit, tuple(directions), moved[whole], pairs[name])
     return MeanGradient({name: fit(name) for name in chosen}, values, *about)
 
@@ -219,13 +208,14 @@ def gradient_of_pairs(
     inverse = np.linalg.inv(moved.T @ moved)
     slopes = inverse @ moved.T @ half
     left = half - moved @ slopes
-    weight = left / (1 - np.einsum("ij,jk,ik->i", moved, inverse, moved))  # HC3
     bread = inverse @ moved.T
+    weight = left / (1 - np.einsum("ij,ji->i", moved, bread))  # HC3
+    slope_error = np.sqrt((bread**2) @ weight**2)
     total = float(np.sum(half * half))
     error = lambda x: float(np.std(x, ddof=1) / math.sqrt(len(half)))
     means = float(middle.mean()), error(middle), float(drift.mean()), error(drift)
     explained = 1 - float(np.sum(left * left)) / total if total > 0 else math.nan
-    return StatisticGradient(name, unit, *means, directions, slopes, (bread * weight**2) @ bread.T, explained)
+    return StatisticGradient(name, unit, *means, directions, slopes, slope_error, explained)
 
 
 @dataclasses.dataclass(frozen=True)

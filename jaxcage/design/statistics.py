@@ -28,35 +28,20 @@ from .surrogate import Models, Values
 
 
 CAGE_PARAMETERS = (
-    "guidance_gap",
-    "pocket_clearance",
-    "land_width",
-    "eccentricity",
-    "cage_mass",
-    "cage_inertia",
-    "pocket_stiffness",
-    "inner_land_diameter",
+    *("guidance_gap", "pocket_clearance", "land_width", "eccentricity"),
+    *("cage_mass", "cage_inertia", "pocket_stiffness", "inner_land_diameter"),
 )
 """Parameters of a whole bearing that a design of its cage may change: load, speed and oil stay as they are."""
 BALANCE, OBJECTIVE, EXPONENT = "balance_grade_mm_per_s", "objective", "exponent"
-STATISTICS = (
-    "cage_slip",
-    "pocket_impulse_N_s",
-    "land_impulse_N_s",
-    "pocket_wear_mm3_per_h",
-    "land_wear_mm3_per_h",
-    "friction_power_W",
-)
+IMPULSES, WEAR = ("pocket_impulse_N_s", "land_impulse_N_s"), ("pocket_wear_mm3_per_h", "land_wear_mm3_per_h")
+STATISTICS = ("cage_slip", *IMPULSES, *WEAR, "friction_power_W")
 """Quantities of a whole bearing that answer to its design."""
-COMPARED = (*STATISTICS, "pocket_force_peak_N", "land_force_peak_N", BALANCE)
+FORCES = ("pocket_force_peak_N", "land_force_peak_N")
+COMPARED = (*STATISTICS, *FORCES, BALANCE)
 """Statistics of a whole bearing that are shown before and after."""
 TERMS: Mapping[str, tuple[str, ...]] = {
-    "wear": ("pocket_wear_mm3_per_h+land_wear_mm3_per_h",),
-    "force": ("pocket_force_peak_N", "land_force_peak_N"),
-    "impulse": ("pocket_impulse_N_s", "land_impulse_N_s"),
-    "power": ("friction_power_W",),
-    "slip": ("cage_slip",),
-    "balance": (BALANCE,),
+    **{"wear": ("+".join(WEAR),), "force": FORCES, "impulse": IMPULSES},
+    **{"power": ("friction_power_W",), "slip": ("cage_slip",), "balance": (BALANCE,)},
 }
 """Terms of the objective of a whole bearing: statistics relative to their present values; of two each counts half."""
 BEARING_MEASURES = {name: name for name in COMPARED[:-1]} | {n: TERMS[n][0] for n in ("wear", "power", "slip")}

@@ -44,6 +44,7 @@ from .chance_tables import (
     narrowed_table as narrowed_table,
     operating_chances as operating_chances,
     range_words as range_words,
+    unknowns_table as unknowns_table,
 )
 from .columns import (
     branch_columns as branch_columns,

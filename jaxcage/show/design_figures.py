@@ -144,14 +144,12 @@ def chance_of_chaos(
     rpm: Float[np.ndarray, " speeds"],
     chance: Float[np.ndarray, " speeds"],
     interval: tuple[Float[np.ndarray, " speeds"], Float[np.ndarray, " speeds"]],
-    bands: Sequence[tuple[str, tuple[float, float, float]]] = (),
     ax: Axes | None = None,
 ) -> Axes:
     """Chance of chaos at each speed with its 95 % bar, blue where calm, red where chaotic, purple where it is not
-    decided; quantiles of the edges beneath the zero line.
+    decided.
 
-    **Arguments:** speeds of the cage [rpm]; chances; lower and upper bounds; names of edges with their 5 %, 50 % and
-    95 % quantiles [rpm]; axes.
+    **Arguments:** speeds of the cage [rpm]; chances; lower and upper bounds; axes.
     """
     ax = axes_or_new(ax, 9.0, 4.2)
     groups = {
@@ -166,15 +164,8 @@ def chance_of_chaos(
             ax.errorbar(rpm[which], chance[which], yerr=bars[:, which], **style)
     for level in (SURE, 1 - SURE):
         ax.axhline(level, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)))
-    for i, (name, (low, middle, high)) in enumerate(bands):
-        y = -0.09 - 0.08 * i
-        ax.plot([low, high], [y, y], color=GREY, linewidth=4, solid_capstyle="butt", alpha=0.6)
-        ax.plot([middle], [y], "|", color="#000000", markersize=7)
-        left = high > rpm[0] + 0.8 * (rpm[-1] - rpm[0])  # the name goes where it stays inside
-        style = {"textcoords": "offset points", "ha": "right" if left else "left", "va": "center", "fontsize": 8}
-        ax.annotate(name, (low if left else high, y), (-4 if left else 4, 0), **style)
     pad = 0.01 * (rpm[-1] - rpm[0]) or 50.0
-    ax.set(ylim=(-0.05 - 0.09 * len(bands), 1.05), xlim=(rpm[0] - pad, rpm[-1] + pad), ylabel="Chance of chaos")
+    ax.set(ylim=(-0.05, 1.05), xlim=(rpm[0] - pad, rpm[-1] + pad), ylabel="Chance of chaos")
     ax.set_yticks(np.linspace(0, 1, 6))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, frameon=False, fontsize=8.5)
     return label_speed(ax)
