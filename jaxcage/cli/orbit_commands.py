@@ -227,7 +227,6 @@ def _of_means(
         notes.append(f"Zero in every run: {', '.join(absent)}")
     counts = {n: getattr(found, n) for n in ("pairs", "failed", "inaccurate")} | {"spread": given["spread"]}
     document = subject.both(at) | length | counts
-    )
     files = {"figure": (f"_{means.speed:g}rpm.png", jc.show.statistic_bars(found, title))}
     return Answer(said, jc.show.mean_gradient_tables(title, found), notes, document, subject, files)
 
