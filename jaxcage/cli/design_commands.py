@@ -142,7 +142,7 @@ def sensitivity(
     """
     subject, d = read_case(case, means.load), jc.design
     model, name, bounds = subject.model, subject.name, read_bounds(vary, subject)
-    samples, files = _power(samples or subject.usual(64, 32)), {}
+    samples, files = samples or subject.usual(64, 32), {}
     if of not in d.BEARING_MEASURES:
         raise InputError(f"Option --of must be one of {', '.join(d.BEARING_MEASURES)}, but '{of}' was given.")
     with show.computing(f"sensitivity {name}") as say:
@@ -184,13 +184,6 @@ def sensitivity(
     document = {"vary": bounds, "of": what, "tolerance_percent": tolerance, "designs": shares.evaluations}
     document |= {"doubtful": shares.doubtful, "scatter": shares.scatter, "budgets": budgets}
     return Answer(said, tables, notes, document, subject, files)
-
-
-def _power(samples: int) -> int:
-    """A number of samples. **Raises:** `InputError` for one that is no power of 2."""
-    if samples < 2 or samples & (samples - 1):
-        raise InputError(f"Option --samples must be a power of 2, but {samples} was given.")
-    return samples
 
 
 def unknowns(

@@ -58,7 +58,7 @@ from .survival_edges import (
     lasting_edges as lasting_edges,
     zone_width as zone_width,
 )
-from .variance import SobolIndices as SobolIndices, global_sensitivity as global_sensitivity, sobol_of as sobol_of
+from .variance import SobolIndices as SobolIndices, global_sensitivity as global_sensitivity
 
 
 check_layer(globals(), "global_sensitivity mean_gradient surrogate_search tolerance_budget")

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float
@@ -78,6 +78,9 @@ def global_sensitivity(
 ) -> SobolIndices:
     """Sobol indices of the values of designs, parameters drawn evenly between their bounds.
 
+    The estimators are (b) and (f) of table 2 in Saltelli et al., Comput. Phys. Commun. 181 (2010) 259. Indices of a
+    parameter without any effect are 0.
+
     **Arguments:** design; bounds [SI] by name; function of a list of designs that returns their values, or those from
     each block of their runs; base samples, a power of 2: samples (parameters + 2) designs are evaluated in one batch.
 
@@ -85,50 +88,29 @@ def global_sensitivity(
     """
     require_at_least(0, seed=seed)
     checked_bounds(system, vary)
-    by_block = np.empty((0, 1))
-
-    def evaluate(places: np.ndarray) -> np.ndarray:
-        nonlocal by_block
-        by_block = np.asarray(values(designs_at(system, vary, places))).reshape(len(places), -1)
-        if lost := int(np.sum(~np.isfinite(by_block).all(axis=1))):
-            raise InputError(f"All designs must have a value, but {lost} of {len(places)} have none.")
-        return by_block.mean(axis=1)
-
-    shares = sobol_of(evaluate, list(vary), samples=samples, seed=seed)
-    variance = float(np.var(by_block.mean(axis=1)))
-    if by_block.shape[1] == 1 or not variance > 0:
-        return shares
-    return dataclasses.replace(shares, scatter=min(1.0, float(np.mean(scatter(by_block) ** 2)) / variance))
-
-
-def sobol_of(
-    evaluate: Callable[[Float[np.ndarray, "designs n"]], Float[np.ndarray, " designs"]],
-    names: Sequence[str],
-    *,
-    samples: int,
-    seed: int = 0,
-) -> SobolIndices:
-    """Sobol indices of a function of places between 0 and 1, by the estimators (b) and (f) of table 2 in Saltelli et
-    al., Comput. Phys. Commun. 181 (2010) 259. Indices of a parameter that changes nothing in any sample are 0.
-
-    **Raises:** `ValueError` for samples that are no power of 2.
-    """
     if samples < 2 or samples & (samples - 1):
         raise ArgumentError("samples", said=f"must be a power of 2, but {samples} was given.")
-    n = len(names)
+    n = len(vary)
     a, b = np.split(sobol(2 * n, samples, seed), 2, axis=1)
     mixed = [np.where(np.arange(n) == i, b, a) for i in range(n)]
-    f = evaluate(np.concatenate([a, b, *mixed])).reshape(n + 2, samples)
+    places = np.concatenate([a, b, *mixed])
+    by_block = np.asarray(values(designs_at(system, vary, places))).reshape(len(places), -1)
+    if lost := int(np.sum(~np.isfinite(by_block).all(axis=1))):
+        raise InputError(f"All designs must have a value, but {lost} of {len(places)} have none.")
+    f = by_block.mean(axis=1).reshape(n + 2, samples)
 
     def shares(f: np.ndarray) -> np.ndarray:
         """First and total indices of values at both sets of samples, and at the first with one column of the other."""
         variance = np.var(f[:2], axis=(0, -1))
-        gone = f[2:] - f[0]
-        both = np.stack([np.mean(f[1] * gone, axis=-1), 0.5 * np.mean(gone**2, axis=-1)])
+        change = f[2:] - f[0]
+        both = np.stack([np.mean(f[1] * change, axis=-1), 0.5 * np.mean(change**2, axis=-1)])
         return both / np.where(variance > 0, variance, np.inf)
 
     rows = np.random.default_rng(seed).integers(samples, size=(RESAMPLES, samples))
     ends = np.percentile(shares(f[:, rows]), [TAIL, 100 - TAIL], axis=-1)
-    first, total = (dict(zip(names, row, strict=True)) for row in shares(f).tolist())
-    interval = lambda k: dict(zip(names, zip(*ends[:, k].tolist(), strict=True), strict=True))
-    return SobolIndices(first, total, interval(0), interval(1), f.size, samples)
+    first, total = (dict(zip(vary, row, strict=True)) for row in shares(f).tolist())
+    interval = lambda k: dict(zip(vary, zip(*ends[:, k].tolist(), strict=True), strict=True))
+    variance, noise = float(np.var(f)), 0.0
+    if by_block.shape[1] > 1 and variance > 0:
+        noise = min(1.0, float(np.mean(scatter(by_block) ** 2)) / variance)
+    return SobolIndices(first, total, interval(0), interval(1), f.size, samples, noise)
