@@ -115,7 +115,9 @@ def _runs(subject: Subject, over: o.Range, means: o.MeanOptions, seed: int, prog
         length = means.length(starts=4, discard=10, revolutions=20)
         return jc.design.Runs.of_bearing(subject.speed(means.speed), **length, seed=seed, progress=progress)
     length: dict[str, Any] = means.length(starts=1, discard=150, revolutions=100)
-    return jc.design.Runs(subject.range(over, 48), **length, progress=progress)
+    if (speeds := subject.range(over, 48)).size < 2:
+        raise InputError("Option --count must be at least 2, but 1 was given.")
+    return jc.design.Runs(speeds, **length, progress=progress)
 
 
 def sensitivity(
