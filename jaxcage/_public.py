@@ -22,7 +22,6 @@ from .analysis import (
     zones as zones,
 )
 from .bearing import Bearing as Bearing, Lubricant as Lubricant
-from .design import DesignSpace as DesignSpace, optimise as optimise
 from .lanes import (
     label_map as label_map,
     open_study as open_study,

@@ -118,7 +118,7 @@ ENTRIES: dict[str, Callable[[], Any]] = {
     "branch": lambda: jc.branch(DUFFING, np.zeros(2), lower=1.0, upper=2.0),
     "case": lambda: jc.case("1a"),
     "equilibrium": lambda: jc.equilibrium(CASE, 900.0),
-    "optimise": lambda: jc.optimise(CASE, {"guidance_gap": (3e-4, 6e-4)}, jc.design.cost()),
+    "surrogate_search": lambda: jc.design.surrogate_search(CASE, {"guidance_gap": (3e-4, 6e-4)}, lambda models: SPEEDS),
     "periodic_orbit": lambda: jc.periodic_orbit(DUFFING, 1.0),
     "simulate": lambda: jc.simulate(DUFFING, 1.0, revolutions=1),
     "study": lambda: jc.study(DUFFING, {"speed": SPEEDS}, store="nowhere", name="duffing", version="1"),

@@ -50,7 +50,6 @@ from .problem import pick as pick
 from .search import (
     Stretch as Stretch,
     SynchronousOrbits as SynchronousOrbits,
-    coexisting_orbits as coexisting_orbits,
     synchronous_orbits as synchronous_orbits,
 )
 from .step_lengths import StepControl as StepControl
@@ -64,6 +63,6 @@ from .unstable_ranges import (
 
 check_layer(
     globals(),
-    "bifurcation branch cascade coexisting_orbits curve "
+    "bifurcation branch cascade curve "
     "explain leading_multiplier loss_zones periodic_orbit sensitivities sensitivity synchronous_orbits",
 )

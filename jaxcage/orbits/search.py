@@ -1,4 +1,4 @@
-"""Search for orbits without a hint: synchronous (period-1) orbits over a range of speed, coexisting ones at one speed.
+"""Search for synchronous (period-1) orbits over a range of speed, without a hint of where they are.
 
 Newton's method leads to stable orbits from the ends of simulations on a coarse grid of speeds. Each orbit is followed
 both ways, until every orbit that was met lies on a known branch. Stable stretches of the branches are bounded by
@@ -10,22 +10,17 @@ import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from .._arguments import require_at_least, require_x64
-from .._form import compiled
+from .._arguments import require_at_least
 from .._notebook import notebook_html
-from .._types import Scalar
 from ..lanes import initial_states, sweep
-from ..models import AbstractForcedSystem, require_speeds
-from ..solve import AbstractMethod, strobe_map
+from ..models import AbstractForcedSystem
+from ..solve import AbstractMethod
 from .branch import Branch, follow_both_ways
 from .continuation import ContinuationProblem, orbit_curves
-from .orbit import Orbit, periodic_orbit
 from .point import Point
 from .problem import SPEED, Given
 from .step_lengths import StepControl
@@ -34,8 +29,6 @@ from .step_lengths import StepControl
 ROUND, ROUNDS = 4, 8  # branches followed at a time, and how often
 PATIENCE = 150  # unstable orbits in a row after which a branch is not followed further
 ON_BRANCH = 0.03  # largest distance of an orbit on a branch from the branch, in units of the system's scale
-SPREAD = 0.6  # random initial states are spread over this share of the system's scale in every direction
-SAME = 1e-4  # largest distance of equal orbits: one that hardly attracts moves by a hundred times its map's error
 NEARLY = 0.1  # a simulation that moves by less in its last revolution, in units of the scale, approaches an orbit
 Progress = Callable[[str, int, int], None]
 Scale = Callable[[float], np.ndarray]
@@ -317,48 +310,3 @@ def _merged(pieces: Sequence[_Piece], scale: Scale) -> list[_Piece]:
         else:
             whole.append(piece)
     return whole
-
-
-# --- one speed -----------------------------------------------------------------------------------------------------
-
-
-def coexisting_orbits(
-    system: AbstractForcedSystem,
-    speed: Scalar,
-    periods: int = 1,
-    *,
-    count: int = 24,
-    revolutions: int = 5,
-    seed: int = 0,
-    method: AbstractMethod | None = None,
-) -> list[Orbit]:
-    """Find orbits that close after `periods` revolutions and not earlier, from the system's and random initial states.
-
-    **Arguments:** system and speed [rad/s]; number of random states and their seed; revolutions of simulation before
-    Newton's method: with few, unstable orbits are found as well.
-
-    **Returns:** distinct orbits, the stable ones first. There may be more.
-    """
-    require_x64()
-    require_at_least(0, seed=seed)
-    require_at_least(1, periods=periods, count=count)
-    require_speeds(system, speed)
-    scale = np.array([float(c) for c in system.scale(speed)])
-    own = np.array([[float(c) for c in y] for y in system.starts(speed)])
-    random = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, (count, scale.size)) * scale
-    find = lambda y: periodic_orbit(system, speed, periods, guess=y, revolutions=revolutions, method=method)
-    found = jax.vmap(find)(jnp.asarray(np.concatenate([own, random])))
-    strobe = lambda orbit, y: strobe_map(system, jnp.asarray(speed, dtype=float), orbit.method)(tuple(y))
-    advance = compiled(jax.vmap(lambda orbit, y: jnp.stack(strobe(orbit, y).y)))
-    rows = [found.state]
-    for _ in range(periods - 1):
-        rows.append(advance(found, rows[-1]))
-    images = np.stack([np.asarray(row) / scale for row in rows], axis=1)
-    near = lambda a, b: bool(np.max(np.abs(a - b)) < SAME)
-    kept: list[int] = []
-    for i in np.flatnonzero(np.asarray(found.converged)):
-        shorter = any(near(images[i, 0], images[i, j]) for j in range(1, periods))
-        if not shorter and not any(near(images[i, 0], image) for k in kept for image in images[k]):
-            kept.append(int(i))
-    orbits = [jax.tree.map(lambda x: x[i] if eqx.is_array(x) and x.ndim else x, found) for i in kept]
-    return sorted(orbits, key=lambda o: float(jnp.max(jnp.abs(o.multipliers))))
