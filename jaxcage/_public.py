@@ -53,7 +53,6 @@ from .orbits import (
 )
 from .solve import (
     Trajectory as Trajectory,
-    bearing_over_time as bearing_over_time,
     method as method,
     native as native,
     ramp as ramp,

@@ -66,16 +66,12 @@ from .outcomes import (
 from .revolution import StrobeMap as StrobeMap, pushed as pushed, strobe_map as strobe_map
 from .simulate import (
     Trajectory as Trajectory,
-    bearing_over_time as bearing_over_time,
     ramp as ramp,
     simulate as simulate,
 )
 from .solvers import (
     ClassicalRK4 as ClassicalRK4,
-    NewmarkBeta as NewmarkBeta,
-    Rodas3 as Rodas3,
     Rodas4 as Rodas4,
-    RosenbrockTableau as RosenbrockTableau,
     rosenbrock_step as rosenbrock_step,
 )
 from .steps import march as march, march_with_tangents as march_with_tangents, with_tangents as with_tangents
@@ -83,5 +79,5 @@ from .steps import march as march, march_with_tangents as march_with_tangents, w
 
 check_layer(
     globals(),
-    "bearing_over_time method native ramp simulate strobe_map",
+    "method native ramp simulate strobe_map",
 )
