@@ -27,7 +27,6 @@ from .lanes import (
     label_map as label_map,
     open_study as open_study,
     rpm as rpm,
-    run_up_down as run_up_down,
     study as study,
     sweep as sweep,
 )

@@ -43,7 +43,6 @@ unwrap = inspect.unwrap
         (lambda: jc.periodic_orbit(DUFFING, 1.0, guess=3), "`guess` must be a state of 2 numbers, but 3"),
         (lambda: jc.bifurcation(DUFFING, "fold", 1.0, reach=np.inf), "`reach` must be at least 0 and finite"),
         (lambda: jc.bifurcation(DUFFING, "fold", (1, 2, 3)), r"`guess` must be .*, but \(1, 2, 3\) was given"),
-        (lambda: jc.study(DUFFING, {"speed": SPEEDS}, store="s", executor="slurm"), "one of local, dask, but 'slurm'"),
         (lambda: jc.method(solver="euler"), "must be one of"),
         (lambda: jc.method(steps=10, tolerance=1e-3), "must not both"),
         (lambda: jc.method(tolerance=2.0), "between 0 and 1"),

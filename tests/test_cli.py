@@ -73,8 +73,6 @@ REFUSED = [
     (f"{GAP}=0.4mm:0.5mm", "--sample must say how many"),
     (f"{STUDY} --sample 8", "--sample needs an interval or a tolerance"),
     (f"{STUDY} --shard 1/{'9' * 5000}", "--shard must be I/N"),
-    (f"{STUDY} --workers 2", "--workers go with --executor dask"),
-    (f"{STUDY} --executor slurm", "--executor"),
     (f"{STUDY} --store ../elsewhere", "--store must name a folder within --out"),
     ("design 1a --searches 3 --scouts 1", "--scouts"),
     ("design 1a --scatter eccentricity=weibull", "weibull"),

@@ -5,7 +5,7 @@ import dataclasses
 import json
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import tyro
@@ -341,13 +341,9 @@ def study(
     seed: o.Seed = 0,
     starts: o.OptionalCount = None,
     exponents: o.OptionalCount = None,
-    strobe: o.FromZero = 0,
     store: Annotated[str | None, o.text("name a folder within --out", o.is_within)] = None,
     chunk: o.OptionalCount = None,
     shard: o.Shard = (1, 1),
-    executor: Literal["local", "dask"] = "local",
-    scheduler: o.OptionalText = None,
-    workers: o.OptionalCount = None,
     check: bool = False,
     run: o.RunOptions = o.RunOptions(),
     show: o.ShowOptions = o.ShowOptions(),
@@ -360,26 +356,20 @@ def study(
         sample: Number of samples, best a power of 2.
         starts: Initial states at each point; all of the model's own if left out.
         exponents: Number of Lyapunov exponents.
-        strobe: Strobe states stored of each lane, the last ones.
         store: Name of the store within the output folder.
         chunk: Lanes computed and stored together.
         shard: Part of the work, e.g. 2/4: every fourth chunk from the second on. All parts write to the same store.
-        executor: Where to run: on all cores of this machine, or on dask.distributed.
-        scheduler: Address of a dask scheduler, e.g. tcp://host:8786; a cluster on this machine if left out.
-        workers: Processes of the cluster on this machine; one a core if left out.
         check: Compute nothing: compare every chunk of the store with its checksum.
     """
     subject = read_case(case)
     path = Path(show.out) / (store or f"study_{subject.name}.zarr")
     if check:
         return _checked(subject, path)
-    if executor == "local" and (scheduler is not None or workers is not None):
-        raise InputError("Options --scheduler and --workers go with --executor dask.")
     given, done = read_vary(vary, subject), []
     if np.prod([max(sample, 1.0), *(float(x.size) for x in given.values() if isinstance(x, np.ndarray))]) > MOST_POINTS:
         raise InputError(f"Options --vary and --sample must make at most {MOST_POINTS} points to run lanes at.")
-    settings: dict[str, Any] = {"samples": sample, "seed": seed, "starts": starts, "strobe": strobe, "lanes": chunk}
-    settings |= {"shard": shard, "executor": executor, "scheduler": scheduler, "workers": workers, **run.settings}
+    settings: dict[str, Any] = {"samples": sample, "seed": seed, "starts": starts, "lanes": chunk}
+    settings |= {"shard": shard, **run.settings}
     settings |= {} if exponents is None else {"exponents": exponents}
     with show.computing(f"study {subject.name}", ADVICE) as bar:
 
@@ -391,8 +381,6 @@ def study(
             with jc.study(subject.model, given, store=path, progress=report, **settings) as stored:
                 names = [str(name) for name, x in stored.data_vars.items() if x.dims == stored["label"].dims]
                 found = stored[names].load()
-        except ImportError as error:  # of an extra
-            raise InputError(str(error)) from error
         except ValueError as error:  # a chunk that another shard has written
             if isinstance(error, InputError):
                 raise

@@ -30,6 +30,7 @@ from .engine import (
     alike as alike,
     cores as cores,
     engine_of as engine_of,
+    errors_of_parts as errors_of_parts,
     histories as histories,
 )
 from .ir import UnknownOperation as UnknownOperation, say_once as say_once

@@ -16,10 +16,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Array, Float, Int
 
 from .._errors import ArgumentError
-from .._form import split
+from .._form import Form, compiled, split
 from ..models import AbstractForcedSystem
 from .fields import SAMPLED, LaneNumbers, Numbers, room_for, traced_field
 from .ir import UnknownOperation, say_once
@@ -286,27 +286,33 @@ class Lanes:
         self, some: Int[np.ndarray, " some"], y: Float[np.ndarray, "some numbers"]
     ) -> tuple[Float[np.ndarray, "some numbers"], Float[np.ndarray, " some"]]:
         """Scale of each of some lanes, 1 for what is integrated beside the state, and excursion of its state."""
-        count = some.size
+        count, dim = some.size, self.system.dimension
         room = room_for(count)
         filled = np.concatenate([some, np.broadcast_to(some[-1:], room - count)])
-        states = np.concatenate([y, np.broadcast_to(y[-1:], (room - count, y.shape[1]))])
-        dim = self.system.dimension
-        scale, excursion = _scales(self.form, self.several)(self.speed[filled], self.rows(filled), states[:, :dim])
+        states = np.concatenate([y[:, :dim], np.broadcast_to(y[-1:, :dim], (room - count, dim))])
+        scale, excursion = self.each(_scale_and_excursion, filled, states)
         ones = np.ones((count, y.shape[1] - dim))
-        return np.concatenate([np.asarray(scale)[:count], ones], axis=1), np.asarray(excursion)[:count]
+        return np.concatenate([scale[:count], ones], axis=1), excursion[:count]
+
+    def each(self, f: Callable[..., Any], some: Int[np.ndarray, " some"], *arrays: np.ndarray) -> Any:
+        """`f(model, speed, ...)` of some lanes, a function of a module; arrays have the lanes first."""
+        rows = [jnp.asarray(x) for x in self.rows(some)]
+        given = [jnp.asarray(x) for x in (self.speed[some], *arrays)]
+        return jax.tree.map(np.asarray, _mapped(f, self.form, self.several, rows, *given))
 
 
-@functools.lru_cache(maxsize=32)
-def _scales(form: Any, several: bool) -> Any:
-    """Scales and excursions of lanes, by speed, numbers of the system and state."""
+@compiled
+def _mapped(f: Callable[..., Any], form: Form, several: bool, rows: Any, speed: Array, *arrays: Array) -> Any:
+    def lane(row: Any, speed: Array, *arrays: Array) -> Any:
+        return jax.tree.map(lambda x: jnp.asarray(x, float), f(form.filled(row), speed, *arrays))
 
-    def of(speed: Any, row: Any, y: Any) -> tuple[Any, Any]:
-        system = form.filled(row)
-        scale, state = system.scale(speed), y if system.beside else tuple(y)
-        row = scale if system.beside else jnp.stack([jnp.asarray(s, float) for s in scale])
-        return row, jnp.asarray(system.excursion(state))
+    return jax.vmap(lane, in_axes=(0 if several else None, 0, *(0 for _ in arrays)))(rows, speed, *arrays)
 
-    return jax.jit(jax.vmap(of, in_axes=(0, 0 if several else None, 0)))
+
+def _scale_and_excursion(system: AbstractForcedSystem, speed: Array, y: Array) -> tuple[Array, Any]:
+    scale, state = system.scale(speed), y if system.beside else tuple(y)
+    row = scale if system.beside else jnp.stack([jnp.asarray(s, float) for s in scale])
+    return row, system.excursion(state)
 
 
 def histories(
