@@ -15,7 +15,6 @@ from . import (
 from ._arguments import enable_x64 as enable_x64
 from ._parameters import parameter_info as parameter_info, parameters as parameters, replace as replace
 from .analysis import (
-    equilibrium as equilibrium,
     measures as measures,
     stretches as stretches,
     summary as summary,

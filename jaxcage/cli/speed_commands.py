@@ -63,7 +63,7 @@ def simulate(
     document |= {"outcome": found.outcome, "error": found.error, "measures": {n: m.value for n, m in measures.items()}}
     if subject.with_rollers:
         rollers = jc.analysis.rollers
-        history, orders = rollers.roller_history(model, found), rollers.bearing_orders(model, found)
+        history, orders = model.roller_history(found), model.known_orders(found)
         around, spectra = rollers.around(history), rollers.bearing_spectra(history) if length["revolutions"] > 1 else {}
         document |= {"around": around, "orders": orders, "force_shares": rollers.pocket_force_distribution(history)}
         tables += [jc.show.circumference_table(around), *jc.show.line_tables(spectra, orders)]

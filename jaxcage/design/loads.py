@@ -195,5 +195,5 @@ def _order(path: Complex[np.ndarray, " samples"], revolutions: int) -> float:
     weights /= weights.sum()
     lines = np.abs(np.fft.fftshift(np.fft.fft(weights * (path - weights @ path))))
     order = np.fft.fftshift(np.fft.fftfreq(n, revolutions / n))
-    peaks = dominant_orders(OrderSpectrum(order, lines, "hann"), 1)
+    peaks = dominant_orders(OrderSpectrum(order, lines), 1)
     return peaks[0].order if peaks else float("nan")

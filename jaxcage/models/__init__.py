@@ -10,6 +10,7 @@
 | `bearing_model` | the whole bearing: parameters, initial states, magnitudes, ready-made bearings |
 | `bearing_states` | its state, and the quantities beside it                                       |
 | `bearing_field` | its equations of motion at one shaft speed                                     |
+| `bearing_history` | forces on every roller along a time history                                  |
 | `bearing_quantities` | quantities that it reports                                                |
 | `contacts`   | its contacts: raceways, pockets, guiding land, oil                              |
 | `cage_quantities` | quantities that a cage reports of a time history                           |
@@ -17,6 +18,7 @@
 
 from .._arguments import check_layer
 from .bearing_field import MOVING as MOVING, BearingAtSpeed as BearingAtSpeed, Passed as Passed
+from .bearing_history import RollerHistory as RollerHistory
 from .bearing_model import (
     CAGE_STARTS as CAGE_STARTS,
     WHOLE_BEARINGS as WHOLE_BEARINGS,
