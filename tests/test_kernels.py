@@ -11,7 +11,7 @@ import pytest
 from helpers import even, raw_sweep, wide_but
 
 import jaxcage as jc
-from jaxcage._form import compiled
+from jaxcage._pytrees import compiled
 from jaxcage.analysis import failed
 from jaxcage.solve import march, method, native, strobe_map
 from jaxcage.solve.method import TERM, moved_by

@@ -8,11 +8,10 @@ from jaxtyping import Array, Float
 
 from .._arguments import require_x64
 from .._errors import ArgumentError
-from .._form import compiled
-from .._notebook import notebook_html
+from .._pytrees import compiled
 from ..forces import Force
 from ..models import CAGE_QUANTITIES, FORCES, AbstractForcedSystem, CageHistory, CageModel
-from ..quantities import Quantity, averaged
+from ..quantities import Quantity, averaged, notebook_html
 from ..solve import Trajectory
 from .labels import scatter
 

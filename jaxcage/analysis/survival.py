@@ -30,7 +30,7 @@ import scipy.special
 from jaxtyping import Bool, Float
 
 from .._errors import ArgumentError
-from .._notebook import notebook_html
+from ..quantities import notebook_html
 from .labels import CHAOS_THRESHOLD, TORUS_THRESHOLD, closing_period, scatter
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Array, Complex, Float
 
-from .._form import Form, compiled
+from .._pytrees import Form, compiled
 from ..analysis import OrderSpectrum, dominant_orders
 from ..models import AbstractForcedSystem, CageModel
 from ..solve import REVOLUTION, AbstractMethod, Lanes, histories, native

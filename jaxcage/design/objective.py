@@ -15,9 +15,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._errors import ArgumentError, InputError
-from .._form import compiled
 from .._parameters import parameter_paths, parameters, replace
-from .._types import Scalar
+from .._pytrees import Scalar, compiled
 from ..lanes import sobol
 from ..models import AbstractForcedSystem
 

@@ -14,9 +14,9 @@ from jaxtyping import Float
 
 from .._arguments import require_at_least
 from .._errors import ArgumentError
-from .._notebook import notebook_html
 from .._parameters import parameters, replace
 from ..models import AbstractForcedSystem
+from ..quantities import notebook_html
 from .objective import AbstractObjective
 from .statistics import STATISTICS, Runs, statistics_of
 

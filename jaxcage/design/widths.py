@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import overload
 
 from .._errors import ArgumentError
-from .._notebook import notebook_html
 from ..orbits import Sensitivity
+from ..quantities import notebook_html
 from .edges import EdgeSum, FollowedEdges
 from .lasting import LastingEdge
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import equinox as eqx
 
-from .._types import Scalar
+from .._pytrees import Scalar
 from .elementary import smooth_norm, smooth_plus
 
 

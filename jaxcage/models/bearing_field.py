@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._types import Scalar, State
+from .._pytrees import Scalar, State
 from ..forces import cos_sin
 from .bearing_states import LOST, BearingState, Bodies, Rates, Rollers, bodies_of, rollers_of
 from .contacts import (

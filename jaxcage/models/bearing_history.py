@@ -11,8 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._form import compiled
-from .._types import Scalar
+from .._pytrees import Scalar, compiled
 from .bearing_states import BearingState
 from .protocol import AbstractForcedSystem
 

@@ -12,9 +12,8 @@ from jaxtyping import Array, Float
 
 from .._arguments import is_concrete, require_x64
 from .._errors import ArgumentError
-from .._form import compiled
 from .._parameters import choice, parameter
-from .._types import Scalar
+from .._pytrees import Scalar, compiled
 from ..bearing import (
     Bearing,
     Lubricant,

@@ -16,7 +16,7 @@ import numpy as np
 
 from .._arguments import is_concrete
 from .._errors import ArgumentError, InputError
-from .._types import Scalar, State
+from .._pytrees import Scalar, State
 from ..quantities import Quantity
 from .field import AbstractField
 

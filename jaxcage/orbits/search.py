@@ -17,11 +17,10 @@ import numpy as np
 import xarray as xr
 
 from .._arguments import require_at_least, require_x64
-from .._form import compiled
-from .._notebook import notebook_html
-from .._types import Scalar
+from .._pytrees import Scalar, compiled
 from ..lanes import initial_states, sweep
 from ..models import AbstractForcedSystem, require_speeds
+from ..quantities import notebook_html
 from ..solve import AbstractMethod, strobe_map
 from .branch import Branch, follow_both_ways
 from .continuation import ContinuationProblem, orbit_curves

@@ -7,7 +7,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from .._form import compiled
+from .._pytrees import compiled
 from ..bearing import PublishedCase
 from ..models import CageModel
 from ..orbits import LossZones, Point, Stretch, SynchronousOrbits

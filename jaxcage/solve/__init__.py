@@ -14,9 +14,9 @@
 | `method`      | methods by name: machine code, a fixed number of steps, or adaptive steps               |
 | `solvers`     | diffrax solvers of our own: Rosenbrock, Newmark, classical Runge-Kutta                  |
 | `kernel`      | a step of a method as a scalar function                                                 |
-| `call`        | machine code that JAX's programs call                                                   |
-| `steps`       | equal steps inside JAX's programs: lanes, tangents, derivatives of any order            |
-| `revolution`  | the strobe map, differentiable; tangents along which the field changes too              |
+| `xla_call`    | machine code that JAX's programs call                                                   |
+| `march`       | equal steps inside JAX's programs: lanes, tangents, derivatives of any order            |
+| `strobe_map`  | the strobe map, differentiable; tangents along which the field changes too              |
 | `simulate`    | time histories, speed ramps                                                             |
 | `outcomes`    | results of a run, and how it ended                                                      |
 """
@@ -45,6 +45,7 @@ from .loop import (
     STUCK as STUCK,
     TOO_MANY as TOO_MANY,
 )
+from .march import march as march, march_with_tangents as march_with_tangents, with_tangents as with_tangents
 from .method import (
     DEFAULT_ERROR as DEFAULT_ERROR,
     IMPLICIT as IMPLICIT,
@@ -64,7 +65,6 @@ from .outcomes import (
     codes_of as codes_of,
     outcome_code as outcome_code,
 )
-from .revolution import StrobeMap as StrobeMap, pushed as pushed, strobe_map as strobe_map
 from .simulate import (
     Trajectory as Trajectory,
     ramp as ramp,
@@ -75,7 +75,7 @@ from .solvers import (
     Rodas4 as Rodas4,
     rosenbrock_step as rosenbrock_step,
 )
-from .steps import march as march, march_with_tangents as march_with_tangents, with_tangents as with_tangents
+from .strobe_map import StrobeMap as StrobeMap, pushed as pushed, strobe_map as strobe_map
 
 
 check_layer(

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._errors import ArgumentError
-from .._form import Form, compiled, split
+from .._pytrees import Form, compiled, split
 from ..models import AbstractForcedSystem
 from .fields import SAMPLED, LaneNumbers, Numbers, room_for, traced_field
 from .ir import UnknownOperation, say_once

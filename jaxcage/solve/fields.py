@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from .._form import Form, split
+from .._pytrees import Form, split
 from ..forces import cos_sin
 from ..models import (
     BESIDE,

@@ -10,11 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from .._form import Form, compiled, split
+from .._pytrees import Form, compiled, split
 from ..models import AbstractForcedSystem, divide, multiply
 from .method import REVOLUTION, AbstractMethod, moved_by
 from .outcomes import MARKS, OUTCOMES, March
-from .revolution import StrobeMap
+from .strobe_map import StrobeMap
 
 
 UNIT, MOST = 8, 256

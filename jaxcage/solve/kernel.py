@@ -13,13 +13,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from .._form import Form, split
-from .._types import Scalar, State
+from .._pytrees import Form, Scalar, State, split
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, AbstractLinearisation
 from .layout import REVOLUTION
+from .march import march_with_tangents
 from .program import Numbers
 from .solvers import Rodas4, explicit_step, rosenbrock_step
-from .steps import march_with_tangents
 
 
 KernelSolver = Rodas4 | dfx.AbstractERK

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Int
 
 from .._errors import ArgumentError
-from .._types import Scalar, State
+from .._pytrees import Scalar, State
 from ..models import (
     ESCAPE,
     ScaledField,
@@ -21,9 +21,9 @@ from ..models import (
 )
 from .kernel import REVOLUTION, Pieces, can_be_kernel, steps_through
 from .layout import PAIRS
+from .march import with_tangents
 from .outcomes import RESULTS, outcome_code
 from .solvers import ClassicalRK4, Rodas4
-from .steps import with_tangents
 
 
 FIRST_STEPS = 64

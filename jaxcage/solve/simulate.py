@@ -12,8 +12,7 @@ from jaxtyping import Array, Float
 
 from .._arguments import require_at_least, require_x64, shown
 from .._errors import ArgumentError
-from .._notebook import notebook_html
-from .._types import Scalar, State
+from .._pytrees import Scalar, State
 from ..models import (
     INSTEAD,
     AbstractForcedSystem,
@@ -23,6 +22,7 @@ from ..models import (
     require_speeds,
     rollers_of,
 )
+from ..quantities import notebook_html
 from .engine import CHUNK, RETRIES, Lanes, errors_of_parts, errors_of_stretches, has_implicit
 from .kernel import REVOLUTION
 from .method import IMPLICIT, AbstractMethod, FixedSteps, NativeSteps, native

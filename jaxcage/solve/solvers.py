@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from .._errors import ArgumentError
-from .._types import Scalar, State
+from .._pytrees import Scalar, State
 from ..models import AbstractField
 
 

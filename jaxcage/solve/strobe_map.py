@@ -12,8 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Int
 
 from .._arguments import require_x64
-from .._form import split
-from .._types import Scalar, State
+from .._pytrees import Scalar, State, split
 from ..models import AbstractField, AbstractForcedSystem, require_speeds
 from .kernel import REVOLUTION, Pieces, steps_through
 from .method import (
