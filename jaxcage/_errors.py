@@ -40,7 +40,7 @@ def shown(value: Any) -> str:
         except ValueError:  # of thousands of digits
             return f"a very large {type(value).__name__}"
         return text if len(text) < 100 else f"{text[:100]}..."
-    if hasattr(value, "dtype"):
+    if kind_of := getattr(value, "dtype", None):
         kind = "a masked array" if isinstance(value, np.ma.MaskedArray) else "an array"
-        return f"{kind} of shape {np.shape(value)} and kind {value.dtype}"
+        return f"{kind} of shape {np.shape(value)} and kind {kind_of}"
     return f"something of kind {type(value).__name__}"
