@@ -12,7 +12,7 @@
 | `engine`      | the engine of a model; lanes, each a design at a speed; histories                       |
 | `jax_engine`  | the engine inside JAX, for methods and laws without machine code                        |
 | `method`      | methods by name: machine code, a fixed number of steps, or adaptive steps               |
-| `solvers`     | diffrax solvers of our own: Rosenbrock, Newmark, classical Runge-Kutta                  |
+| `solvers`     | diffrax solvers of our own: Rosenbrock, classical Runge-Kutta                           |
 | `kernel`      | a step of a method as a scalar function                                                 |
 | `xla_call`    | machine code that JAX's programs call                                                   |
 | `march`       | equal steps inside JAX's programs: lanes, tangents, derivatives of any order            |
