@@ -15,7 +15,6 @@ from . import (
 from ._arguments import enable_x64 as enable_x64
 from ._parameters import parameter_info as parameter_info, parameters as parameters, replace as replace
 from .analysis import (
-    equilibrium as equilibrium,
     measures as measures,
     stretches as stretches,
     summary as summary,
@@ -26,7 +25,6 @@ from .lanes import (
     label_map as label_map,
     open_study as open_study,
     rpm as rpm,
-    run_up_down as run_up_down,
     study as study,
     sweep as sweep,
 )
@@ -52,7 +50,6 @@ from .orbits import (
 )
 from .solve import (
     Trajectory as Trajectory,
-    bearing_over_time as bearing_over_time,
     method as method,
     native as native,
     ramp as ramp,

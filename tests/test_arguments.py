@@ -43,7 +43,6 @@ unwrap = inspect.unwrap
         (lambda: jc.periodic_orbit(DUFFING, 1.0, guess=3), "`guess` must be a state of 2 numbers, but 3"),
         (lambda: jc.bifurcation(DUFFING, "fold", 1.0, reach=np.inf), "`reach` must be at least 0 and finite"),
         (lambda: jc.bifurcation(DUFFING, "fold", (1, 2, 3)), r"`guess` must be .*, but \(1, 2, 3\) was given"),
-        (lambda: jc.study(DUFFING, {"speed": SPEEDS}, store="s", executor="slurm"), "one of local, dask, but 'slurm'"),
         (lambda: jc.method(solver="euler"), "must be one of"),
         (lambda: jc.method(steps=10, tolerance=1e-3), "must not both"),
         (lambda: jc.method(tolerance=2.0), "between 0 and 1"),
@@ -55,7 +54,6 @@ unwrap = inspect.unwrap
         (lambda: jc.bearing.Material("brass", 1e11, 0.3), "must be a number from .* but 'brass' was given"),
         (lambda: jc.ForcedOscillator(3, coordinates=1), "`acceleration` must be something that can be called, but 3"),
         (lambda: jc.ForcedSystem(DUFFING.acceleration, 2.5), "`dimension` must be a whole number"),
-        (lambda: jc.equilibrium(CASE, -900.0), "`speed` must be positive and finite, at most .*, but -900"),
         (lambda: jc.forces.film_scale(0.1, 1.0, 0.0, 1.0), "`width` must be positive and finite, but 0.0"),
         (lambda: jc.forces.synchronous_force(tau=2**63, amplitude=1.0), "`tau` must be a number, of 64 bits"),
         (lambda: jc.bearing.raceway_surface_speed(1.0, 0.0), "`raceway_diameter` must be positive and finite"),
@@ -117,7 +115,6 @@ def test_a_law_of_ones_own_that_is_wrong_is_explained(law, said: str):
 ENTRIES: dict[str, Callable[[], Any]] = {
     "branch": lambda: jc.branch(DUFFING, np.zeros(2), lower=1.0, upper=2.0),
     "case": lambda: jc.case("1a"),
-    "equilibrium": lambda: jc.equilibrium(CASE, 900.0),
     "surrogate_search": lambda: jc.design.surrogate_search(CASE, {"guidance_gap": (3e-4, 6e-4)}, lambda models: SPEEDS),
     "periodic_orbit": lambda: jc.periodic_orbit(DUFFING, 1.0),
     "simulate": lambda: jc.simulate(DUFFING, 1.0, revolutions=1),

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Array, Complex, Float
 
-from .._form import Form, compiled
+from .._pytrees import Form, compiled
 from ..analysis import OrderSpectrum, dominant_orders
 from ..models import CageModel
 from ..solve import REVOLUTION, AbstractMethod, Lanes, histories, native
@@ -115,5 +115,5 @@ def _order(path: Complex[np.ndarray, " samples"]) -> float:
     weights /= weights.sum()
     lines = np.abs(np.fft.fftshift(np.fft.fft(weights * (path - weights @ path))))
     order = np.fft.fftshift(np.fft.fftfreq(n, 1 / MOTION_SAMPLES))
-    peaks = dominant_orders(OrderSpectrum(order, lines, "hann"), 1)
+    peaks = dominant_orders(OrderSpectrum(order, lines), 1)
     return peaks[0].order if peaks else float("nan")

@@ -14,10 +14,10 @@ from jaxtyping import Float
 
 from .._arguments import require_at_least
 from .._errors import ArgumentError, InputError
-from .._notebook import notebook_html
 from .._parameters import parameters, replace
 from ..models import AbstractForcedSystem
 from ..orbits import Sensitivity
+from ..quantities import notebook_html
 from .statistics import STATISTICS, Runs, Statistic, statistics_of
 
 

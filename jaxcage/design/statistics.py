@@ -18,7 +18,7 @@ from scipy.special import expit
 
 from .._arguments import require_at_least
 from .._errors import ArgumentError
-from .._form import compiled
+from .._pytrees import compiled
 from ..analysis import CHAOS_THRESHOLD, failed
 from ..lanes import Plan, Progress, Run, Speeds, run_lanes
 from ..models import AbstractForcedSystem, BearingModel, CageModel, drawn_places, rolling_start

@@ -16,12 +16,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._errors import ArgumentError
-from .._notebook import notebook_html
 from .._parameters import parameters, replace
 from ..analysis import LIFE_BLOCK, Hazard, Zone, hazard
 from ..lanes import Plan, Progress, Run, run_lanes
 from ..models import CageModel
 from ..orbits import Sensitivity
+from ..quantities import notebook_html
 from ..solve import AbstractMethod
 
 

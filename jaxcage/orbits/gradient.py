@@ -22,10 +22,10 @@ from jaxtyping import Array, Float
 
 from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
-from .._form import compiled
-from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
+from .._pytrees import compiled
 from ..models import AbstractForcedSystem
+from ..quantities import notebook_html
 from ..solve import AbstractMethod
 from .bifurcation import TANGENTIAL, PointEquations, critical_rate
 from .branch import FEIGENBAUM, Cascade

@@ -15,9 +15,9 @@ import numpy as np
 import xarray as xr
 
 from .._arguments import require_at_least
-from .._notebook import notebook_html
 from ..lanes import initial_states, sweep
 from ..models import AbstractForcedSystem
+from ..quantities import notebook_html
 from ..solve import AbstractMethod
 from .branch import Branch, follow_both_ways
 from .continuation import ContinuationProblem, orbit_curves

@@ -334,6 +334,7 @@ def sweeps_beside(names: Sequence[str], sweeps: Sequence[xr.Dataset], zones: Seq
     for ax, sweep in zip(cells[1], sweeps, strict=True):
         add_shaft_axes(figure, sweep, [ax])
     style.legend_below(figure, *cells.ravel())
+    return figure
 
 
 def _lines(ax: Axes, name: str, sweeps: dict[str, xr.Dataset]) -> Axes:
@@ -370,4 +371,3 @@ def quantities_beside(
         label_speed(ax, sweeps[0])
     style.legend_below(figure, cells[0, 0])
     return add_shaft_axes(style.entitled(figure, title), sweeps[0])
-    return figure
