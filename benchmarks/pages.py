@@ -85,7 +85,7 @@ BLOCKS: dict[str, tuple[str, str, Part]] = {
     "speed": (README, "python -m benchmarks", speed),
     "guide-zones-1a": (EDGE, "jaxcage zones 1a", tables("Synchronous-loss", "Elasticities", *CHAOS)),
     "bifurcations-1a-figure": (EDGE, "jaxcage bifurcations 1a", figure("bifurcations_1a.png")),
-    "design-1b": (DESIGN, "jaxcage design 1b", tables("Before and after", "Design of", "Optima")),
+    "design-1b": (DESIGN, "jaxcage design 1b", tables("Before and after", "Design of")),
     "design-1b-figure": (DESIGN, "jaxcage design 1b", figure("design_1b.png")),
     "searches-of-eight": (DESIGN, "python -m benchmarks.pay --table", printed),
     "both-kinds": (PAPER, REPRODUCE, every_kind),

@@ -47,7 +47,7 @@ def main() -> None:
         path.write_text(text, encoding="utf-8")
         print(f'$ grep -E "{SHOWN}" {FILE}  # after editing')
         print("\n".join(x for x in text.splitlines() if re.match(SHOWN, x)), end="\n\n", flush=True)
-        for words in ("statics F", "sweep F --draws 0", "design F --searches 2 --steps 8"):
+        for words in ("statics F", "sweep F --draws 0", "design F --steps 8"):
             show(f"jaxcage {words.replace('F', FILE)}", folder)
         show(f"jaxcage report {FILE} --quick --operating '5000-8000 rpm'", folder)
 

@@ -27,8 +27,9 @@ now = {name: float(value) for name, value in jc.parameters(model).items()}
 # %%
 varied = ("guidance_gap", "eccentricity", "cage_mass", "stiffness_x", "damping", "amplitude", "land_width")
 vary = {name: (0.8 * now[name], 1.2 * now[name]) for name in varied}
-width = jc.design.chaotic_width(4000, 27500, small(20, 4), discard=small(100, 5), revolutions=small(40, 5))
-shares = jc.design.global_sensitivity(model, vary, width, samples=small(16, 2))
+runs = jc.design.Runs(jc.rpm(4000, 27500, small(20, 4)), discard=small(100, 5), revolutions=small(40, 5))
+width = jc.design.chaotic_width(4000, 27500)
+shares = jc.design.global_sensitivity(model, vary, width.values(runs), samples=small(16, 2))
 print(shares)
 
 # %% [markdown]

@@ -18,7 +18,7 @@ import jax
 import numpy as np
 from jax.core import Tracer
 
-from ._errors import ArgumentError
+from ._errors import ArgumentError, shown as shown
 
 
 MOST = 10_000_000
@@ -207,22 +207,6 @@ def _wrong_number(members: tuple[Any, ...], arrays: Sequence[Any], value: Any) -
     if type(value) is int and not -(2**63) <= value < 2**63:
         return "a number, of 64 bits if it is whole"
     return ""
-
-
-def shown(value: Any) -> str:
-    """A value as a message shows it."""
-    plain = bool | int | float | complex | str
-    row = isinstance(value, tuple | list) and all(isinstance(x, plain) for x in value)
-    if row or isinstance(value, plain | np.generic):
-        try:
-            text = repr(value) if row or isinstance(value, str | complex) else str(value)
-        except ValueError:  # of thousands of digits
-            return f"a very large {type(value).__name__}"
-        return text if len(text) < 100 else f"{text[:100]}..."
-    if isinstance(value, _ARRAYS):
-        kind = "a masked array" if isinstance(value, np.ma.MaskedArray) else "an array"
-        return f"{kind} of shape {np.shape(value)} and kind {value.dtype}"
-    return f"something of kind {type(value).__name__}"
 
 
 # Double precision is on, and JAX is of no version that is known to give wrong numbers.

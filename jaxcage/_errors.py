@@ -1,6 +1,9 @@
 """What goes wrong, in sentences that are shown as they are, by a script and by the command alike."""
 
 from collections.abc import Callable
+from typing import Any
+
+import numpy as np
 
 
 class InputError(ValueError):
@@ -25,3 +28,19 @@ class ArgumentError(InputError):
 
 class NoResult(Exception):
     """A computation without a result, in one sentence that says why."""
+
+
+def shown(value: Any) -> str:
+    """A value as a message shows it."""
+    plain = bool | int | float | complex | str
+    row = isinstance(value, tuple | list) and all(isinstance(x, plain) for x in value)
+    if row or isinstance(value, plain | np.generic):
+        try:
+            text = repr(value) if row or isinstance(value, str | complex) else str(value)
+        except ValueError:  # of thousands of digits
+            return f"a very large {type(value).__name__}"
+        return text if len(text) < 100 else f"{text[:100]}..."
+    if kind_of := getattr(value, "dtype", None):
+        kind = "a masked array" if isinstance(value, np.ma.MaskedArray) else "an array"
+        return f"{kind} of shape {np.shape(value)} and kind {kind_of}"
+    return f"something of kind {type(value).__name__}"

@@ -15,19 +15,17 @@ from . import (
 from ._arguments import enable_x64 as enable_x64
 from ._parameters import parameter_info as parameter_info, parameters as parameters, replace as replace
 from .analysis import (
-    equilibrium as equilibrium,
     measures as measures,
     stretches as stretches,
     summary as summary,
     zones as zones,
 )
 from .bearing import Bearing as Bearing, Lubricant as Lubricant
-from .design import DesignSpace as DesignSpace, optimise as optimise
+from .design import Requirements as Requirements, Tolerance as Tolerance, design_for as design_for
 from .lanes import (
     label_map as label_map,
     open_study as open_study,
     rpm as rpm,
-    run_up_down as run_up_down,
     study as study,
     sweep as sweep,
 )
@@ -53,7 +51,6 @@ from .orbits import (
 )
 from .solve import (
     Trajectory as Trajectory,
-    bearing_over_time as bearing_over_time,
     method as method,
     native as native,
     ramp as ramp,

@@ -1,10 +1,12 @@
-"""Quantities that are reported: name, symbol, SI unit, words, and the unit in which people read them.
+"""Quantities that are reported: name, symbol, SI unit, words, and the unit in which people read them; results as HTML.
 
 They give the axes of figures, the attributes of data sets, the heads of tables and of CSV columns. A model declares
 those that it reports of its own (`AbstractForcedSystem.quantities`), with how each follows from averages over a run.
 """
 
 import dataclasses
+import html
+import re
 from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
@@ -147,3 +149,15 @@ def component_names(dimension: int, cage: bool = True) -> tuple[str, ...]:
     """Names of the state components of a cage; those of another system are numbered."""
     numbered = tuple(f"y{i}" for i in range(dimension))
     return _COMPONENTS.get(dimension, numbered) if cage else numbered
+
+
+def notebook_html(self: Any) -> str:
+    """`str(self)` as HTML: the first line as the head, the others as rows, cut where the text leaves a gap or after a
+    colon. A class takes it as its method `_repr_html_`.
+    """
+    head, *lines = str(self).splitlines() or [""]
+    rows = [re.split(r"\s{2,}|(?<=:)\s", line.strip()) for line in lines]
+    cells = [[f'<td style="text-align: left">{html.escape(cell)}</td>' for cell in row] for row in rows]
+    body = "".join(f"<tr>{''.join(row)}</tr>" for row in cells)
+    table = f"<table><tbody>{body}</tbody></table>" if rows else ""
+    return f"<div><strong>{html.escape(head)}</strong>{table}</div>"

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+import short_bearing as short_bearing_of
 from reynolds import film_force
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
@@ -19,7 +20,7 @@ from scipy.sparse.linalg import spsolve
 from scipy.special import gamma
 
 import jaxcage as jc
-from jaxcage import analysis, bearing, forces
+from jaxcage import bearing, forces
 
 
 class Number(NamedTuple):
@@ -163,13 +164,13 @@ VAN_DER_POL_LET_GO = Number(1.0175566306, 1e-9, DOP853)
 
 def short_bearing() -> Iterator[Row]:
     speed = 1500 * math.pi / 30
-    eps = analysis.eccentricity_ratio(525 / (forces.film_scale(0.1, 0.05, 0.03, 1e-4) * speed))
+    eps = short_bearing_of.eccentricity_ratio(525 / (forces.film_scale(0.1, 0.05, 0.03, 1e-4) * speed))
     yield row("short bearing, eccentricity ratio", 0.266298, eps, 6e-7, FRISWELL)
-    stiffness = analysis.film_coefficients(eps).stiffness * 525.0 / 1e-4
+    stiffness = short_bearing_of.film_coefficients(eps).stiffness * 525.0 / 1e-4
     for (name, printed), ours in zip(SHORT_BEARING.items(), np.asarray(stiffness).ravel(), strict=True):
         yield row(f"short bearing, k_{name} [N/m]", printed, ours, 1.0, FRISWELL)
-    small = analysis.film_coefficients(1e-6)
-    whirl = analysis.whirl_threshold(small.stiffness, small.damping)
+    small = short_bearing_of.film_coefficients(1e-6)
+    whirl = short_bearing_of.whirl_threshold(small.stiffness, small.damping)
     what = "whirl threshold of a vanishing load, omega sqrt(c/g)"
     yield row(what, math.sqrt(24 / math.pi), whirl.speed, 1e-9, SHORT)
     yield row("whirl ratio there", 0.5, whirl.whirl_ratio, 1e-9, SHORT)
@@ -274,7 +275,7 @@ def lund_thomsen() -> Iterator[Row]:
 
 def nicholas() -> Iterator[Row]:
     """Their eccentricity ratios have two digits: ours is solved for at their S, by the secant rule."""
-    whirl = lambda eps: analysis.whirl_threshold(*map(jnp.asarray, grooved_bearing(eps, 1.0, 1.5)[2:])).speed
+    whirl = lambda eps: short_bearing_of.whirl_threshold(*map(jnp.asarray, grooved_bearing(eps, 1.0, 1.5)[2:])).speed
     for number, printed in GROOVED_WHIRL.items():
         eps = printed
         for _ in range(4):  # the load is all but proportional to eps

@@ -10,23 +10,21 @@ or down, while mirroring one of them would change the sign of the cross terms. R
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
-
-from jaxcage import replace
-from jaxcage.analysis import (
+from scipy.optimize import brentq
+from short_bearing import (
     LARGEST_WHIRLING,
     attitude_angle,
     eccentricity_ratio,
-    equilibrium,
     film_coefficients,
-    film_whirl_speed,
     load_number,
-    measures,
     whirl_threshold,
 )
-from jaxcage.forces import ElasticRib, RibFilm, film_scale
+
+from jaxcage import replace
+from jaxcage.analysis import measures
+from jaxcage.forces import RibFilm, film_scale
 from jaxcage.models import case
 from jaxcage.solve import simulate
 
@@ -71,9 +69,7 @@ def test_bearing_of_50_mm_radius():
 
 @pytest.mark.parametrize("eps", [1e-8, 1e-3, 0.2, 0.5, 0.9, 0.999])
 def test_eccentricity_ratio_inverts_the_load_number(eps):
-    assert float(eccentricity_ratio(load_number(eps))) == pytest.approx(eps, rel=1e-12)
-    slope = jax.grad(eccentricity_ratio)(load_number(eps))
-    assert float(slope * jax.grad(load_number)(eps)) == pytest.approx(1.0, rel=1e-9)
+    assert eccentricity_ratio(float(load_number(eps))) == pytest.approx(eps, rel=1e-6)
 
 
 @pytest.mark.wide
@@ -117,84 +113,38 @@ def test_eigenvalues_cross_the_axis_at_rouths_threshold(eps):
             assert np.sign(worst.real) == sign and abs(worst.real) > 1e-6
 
 
-# The cage in its film, without support.
-
-
-def cage_in_film(**changes):
-    names = ("stiffness_x", "stiffness_y", "damping", "cubic_stiffness", "cross_stiffness")
-    return replace(case("1a", "preliminary"), **(dict.fromkeys(names, 0.0) | changes))
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("mass", [1e-3, 0.05, 0.15, 0.212])
-def test_cage_in_film_decays_below_its_whirl_speed_and_grows_above(mass):
-    model = cage_in_film(cage_mass=mass)
-    speed = film_whirl_speed(model)
-    at = equilibrium(model, speed)
-    eps = at.eccentricity_ratio
-    assert float(speed) == pytest.approx(float(threshold(eps).speed) * np.sqrt(9.81 / 0.45e-3), rel=1e-8)
-    assert float(at.attitude_angle) == pytest.approx(float(attitude_angle(eps)), rel=1e-8)
-    assert abs(float(at.growth_rate)) < 1e-6
-    ratio = float(at.whirl_frequency / speed)
-    assert ratio == pytest.approx(float(threshold(eps).whirl_ratio), rel=1e-6)
-    assert float(equilibrium(model, 0.99 * speed).growth_rate) < -0.03
-    assert float(equilibrium(model, 1.01 * speed).growth_rate) > 0.03
+def cage_in_film(film, **changes):
+    """A cage in its film alone, without unbalance."""
+    names = ("stiffness_x", "stiffness_y", "damping", "cubic_stiffness", "cross_stiffness", "eccentricity", "amplitude")
+    model = replace(case("1a", "preliminary"), **(dict.fromkeys(names, 0.0) | changes))
+    return eqx.tree_at(lambda m: m.film, model, RibFilm(model.film.land_width, model=film))
 
 
 @pytest.mark.wide
 @pytest.mark.parametrize("film", ["fixed_half", "positive_pressure"])
 @pytest.mark.parametrize("factor", [0.99, 1.01])
 def test_simulated_whirl_decays_and_grows_as_the_eigenvalues_say(factor, film):
-    """A push of 1e-3 c, within 1 % of the threshold: rate, and whirl between 0.500 and 0.524."""
-    width = cage_in_film().film.land_width
-    model = eqx.tree_at(lambda m: m.film, cage_in_film(cage_mass=0.02), RibFilm(width, model=film))
-    model = replace(model, eccentricity=0.0, amplitude=0.0)
-    speed = float(film_whirl_speed(model)) * factor
-    at = equilibrium(model, speed)
-    push = 1e-3 * float(model.clearance)
-    start = (at.coordinates[0] + push, at.coordinates[1], jnp.zeros(()), jnp.zeros(()))
+    """A push of 1e-3 c from the equilibrium, within 1 % of the threshold: rate, and whirl between 0.500 and 0.524."""
+    model = cage_in_film(film, cage_mass=0.02)
+    c, law = float(model.clearance), model.film
+    size = law.n_lands * float(film_scale(model.lubricant.dynamic_viscosity, model.land_radius, law.land_width, c))
+    number = lambda speed: float(model.cage_mass) * 9.81 / (size * speed)
+    edge = lambda speed: float(threshold(eccentricity_ratio(number(speed))).speed) * np.sqrt(9.81 / c)
+    speed = factor * brentq(lambda w: edge(w) - w, 350.0, 700.0)
+    eps = eccentricity_ratio(number(speed))
+    angle, found = float(attitude_angle(eps)), film_coefficients(eps, film)
+    m = speed**2 * c / 9.81
+    k, d = (np.asarray(x) / m for x in (found.stiffness, found.damping))
+    values = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-k, -d]]))
+    worst = values[np.argmax(values.real)]
+    rest = eps * c * np.array([np.sin(angle), -np.cos(angle)])
+    start = (rest[0] + 1e-3 * c, rest[1], 0.0, 0.0)
     run = simulate(model, speed, revolutions=60, discard=20, start=start)
-    away = np.linalg.norm(run.state[:, :2] - np.asarray(at.coordinates), axis=1)
+    away = np.linalg.norm(run.state[:, :2] - rest, axis=1)
     largest = np.max(away.reshape(6, -1), axis=1)  # of ten revolutions each: five turns of whirl
-    rate = np.log(largest[-1] / largest[0]) / (50 * 2 * np.pi / speed)
+    rate = np.log(largest[-1] / largest[0]) / (50 * 2 * np.pi)
     assert np.sign(rate) == (1 if factor > 1 else -1)
-    assert rate == pytest.approx(float(at.growth_rate), rel=0.05)
+    assert rate == pytest.approx(worst.real, rel=0.05)
     ratio = measures(model, run).value("whirl_ratio")
     assert 0.500 < ratio < 0.524
-    assert ratio == pytest.approx(float(at.whirl_frequency) / speed, rel=5e-3)
-
-
-def test_heavy_cage_on_a_weak_film_never_whirls():
-    model = cage_in_film(cage_mass=100.0, land_width=1e-4)
-    assert np.isinf(film_whirl_speed(model))
-    with pytest.raises(ValueError, match="'full'"):
-        full = eqx.tree_at(lambda m: m.film, model, RibFilm(land_width=jnp.asarray(1e-4), model="full"))
-        film_whirl_speed(full)
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("rpm", [2500.0, 9000.0, 27500.0])
-@pytest.mark.parametrize("name", ["1a", "2b"])
-def test_forces_balance_at_the_equilibrium_of_the_full_model(name, rpm):
-    model, speed = case(name, "preliminary"), rpm * np.pi / 30
-    at = equilibrium(model, speed)
-    zero = jnp.zeros(())
-    x, y = at.coordinates
-    forces = model.cage_at(speed).forces(zero, x, y, zero, zero)
-    for i in (0, 1):
-        rest = sum(forces[name][i] for name in ("film", "contact", "support", "weight"))
-        assert abs(float(rest)) < 1e-9 * float(model.cage_mass) * 9.81
-    assert 0 < float(at.eccentricity_ratio) < 0.1  # the support carries most of the weight
-    assert float(at.growth_rate) < 0 and at.eigenvalues.shape == (4,)
-
-
-@pytest.mark.wide
-def test_elastic_rib_sinks_under_both_weights_and_the_cage_with_it():
-    model = case("1a", "preliminary")
-    rib = ElasticRib(*(jnp.asarray(v) for v in (1.0, 1e7, 50.0)))
-    elastic = eqx.tree_at(lambda m: m.rib, model, rib)
-    rigid, soft = equilibrium(model, 800.0), equilibrium(elastic, 800.0)
-    assert soft.eigenvalues.shape == (8,) and float(soft.growth_rate) < 0
-    rib = np.asarray(soft.coordinates[2:])
-    np.testing.assert_allclose(rib, [0.0, -(1.0 + 0.212227) * 9.81 / 1e7], rtol=1e-8, atol=1e-15)
-    np.testing.assert_allclose(soft.coordinates[:2] - rib, rigid.coordinates, rtol=1e-8)
+    assert ratio == pytest.approx(abs(worst.imag), rel=5e-3)

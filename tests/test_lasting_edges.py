@@ -87,7 +87,7 @@ class Planted:
 @pytest.fixture
 def planted(monkeypatch: pytest.MonkeyPatch):
     def plant(seed: int, **law: float) -> None:
-        monkeypatch.setattr("jaxcage.design.lasting._escapes", Planted(seed, **law))
+        monkeypatch.setattr("jaxcage.design.survival_edges._escapes", Planted(seed, **law))
 
     return plant
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage.analysis import cage_forces, film_drag_power, measures
+from jaxcage.analysis import cage_forces, measures
 from jaxcage.models import case
 from jaxcage.models.cage_quantities import winding
 
@@ -90,10 +90,8 @@ def test_drag_power_is_that_of_the_sheared_film(eps, kept):
     model = case("1a", "preliminary")
     radius, width, viscosity = (92.1e-3 - GAP) / 2, 4.2679e-3, 870 * 56e-6
     one = 2 * np.pi * viscosity * SPEED**2 * radius**3 * width / (GAP * np.sqrt(1 - kept**2))
-    power = film_drag_power(model, np.full(3, SPEED), np.full(3, eps))
-    np.testing.assert_allclose(power, 2 * one, rtol=1e-3)
     m = measures(model, orbit(radius=eps * GAP))
-    assert m.value("drag_power") == pytest.approx(power[0], rel=1e-9)
+    assert m.value("drag_power") == pytest.approx(2 * one, rel=1e-3)
 
 
 @pytest.mark.wide

@@ -98,16 +98,3 @@ def test_search_meets_what_only_the_opposite_start_leads_to():
     found = jc.synchronous_orbits(system, 0.5, 0.6, count=3, discard=20, method=jc.method("rk4", steps=128))
     assert {float(np.sign(b.state[0, 0])) for b in found.branches} == {-1.0, 1.0} and found.missed == 0
     assert sorted(s.met for s in found.stretches) == [0, 3]
-
-
-def test_orbits_of_many_starts_are_told_apart():
-    """Three between the folds of the hardening Duffing oscillator, all of period 1: none that closes after two
-    revolutions only."""
-    swing = lambda tau, q, v, speed: (-0.1 * v[0] - q[0] - q[0] ** 3 + 0.3 * jnp.cos(tau),)
-    hardening = jc.ForcedOscillator(swing, coordinates=1, starts=((0.1, 0.2), (2.0, 1.0), (-1.5, 2.0)))
-    find = lambda *given, **more: jc.orbits.coexisting_orbits(*given, **more, method=jc.method("rk4", steps=128))
-    orbits = find(hardening, 1.5, count=24, revolutions=3)
-    assert [o.stable for o in orbits] == [True, True, False]
-    sizes = [np.hypot(o.state[0], o.state[1] / 1.5) for o in orbits]
-    assert sizes[0] != pytest.approx(sizes[1], rel=0.5) and min(sizes[:2]) < sizes[2] < max(sizes[:2])
-    assert find(hardening, 1.5, 2, count=24, revolutions=3) == []

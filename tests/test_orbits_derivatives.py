@@ -164,3 +164,14 @@ def test_hessian_of_a_period_doubling(found):
     np.testing.assert_allclose(hessian, hessian.T, rtol=0, atol=1e-9)
     b = NAMES.index("b")
     assert abs(hessian[b, b] - 0.75 * point.value) < 1e-9
+
+
+def test_derivatives_of_a_multiplier_against_autodiff():
+    """The adjoint through one expansion against JAX's own derivative of the orbit's multipliers."""
+    system = system_of(jnp.asarray(DOUBLE_WELL[0]))
+    at = lambda s: jnp.abs(jc.periodic_orbit(s, 1.15, guess=DOUBLE_WELL[1], method=METHOD).multipliers[0])
+    slope = jax.grad(at)(system)
+    got = jc.orbits.leading_multiplier(system, 1.15, DOUBLE_WELL[1], method=METHOD)
+    assert got.size == pytest.approx(float(at(system)), rel=1e-10)
+    for name, value in got.derivative.items():
+        assert value == pytest.approx(float(jc.parameters(slope)[name]), rel=1e-7, abs=1e-9), name

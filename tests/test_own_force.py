@@ -5,7 +5,6 @@ damping there. A quadratic drag is compared with the equations of motion written
 SciPy.
 """
 
-import dataclasses
 from pathlib import Path
 
 import equinox as eqx
@@ -13,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import reference
-from helpers import beyond_range, raw_sweep
+from helpers import raw_sweep
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
@@ -132,43 +131,12 @@ def test_parameters_of_a_force_of_ones_own_have_names():
 @pytest.mark.wide
 def test_forces_and_moments_of_a_run_name_it(tmp_path: Path):
     run = jc.simulate(OWN, SPEED, revolutions=1, samples=16, method=METHOD)
-    forces, moments = jc.analysis.cage_forces(OWN, run), jc.analysis.cage_moments(OWN, run)
-    assert list(forces) == list(moments) == [*jc.models.FORCES, "ViscousDrag"]
+    forces = jc.analysis.cage_forces(OWN, run)
+    assert list(forces) == [*jc.models.FORCES, "ViscousDrag"]
     np.testing.assert_allclose(forces["ViscousDrag"], -SHARE * run.state[:, 2:], rtol=1e-12)
-    np.testing.assert_allclose(moments["ViscousDrag"], -SHARE * 0.05**2 * SPEED, rtol=1e-12)
-    eps = np.hypot(*run.state[:, :2].T) / float(OWN.clearance)
-    power = jc.analysis.film_drag_power(OWN, run.speed, eps)
-    np.testing.assert_allclose(-moments["film"] * SPEED, power, rtol=1e-6)
-    assert not np.any(moments["contact"])
-    # Pressed into the land the film is no thinner than at the onset of contact.
-    outside = np.full(eps.size, 1.02)
-    place = run.state[:, :2] * (outside / eps)[:, None]
-    pressed = dataclasses.replace(run, state=np.concatenate([place, run.state[:, 2:]], axis=1))
-    power = jc.analysis.film_drag_power(OWN, run.speed, outside)
-    np.testing.assert_allclose(-jc.analysis.cage_moments(OWN, pressed)["film"] * SPEED, power, rtol=1e-6)
-
-
-@pytest.mark.wide
-def test_equilibrium_knows_a_force_of_ones_own():
-    """A force that turns with the cage is left out like the unbalance; one that hides the phase is refused."""
-
-    class Push(AbstractForce):
-        newtons: float
-
-        def force(self, motion):
-            return self.newtons, 0.0, 0.0
-
-    class Hidden(AbstractForce):
-        newtons: float
-
-        def force(self, motion):
-            return self.newtons * jnp.cos(motion.phase), 0.0, 0.0
-
-    soft = beyond_range(jc.replace(CASE, cross_stiffness=0.0, cubic_stiffness=0.0), land_width=1e-7)
-    at = jc.equilibrium(jc.replace(soft, extra=(Push(0.4), Shaker(3.0))), SPEED)
-    assert float(at.coordinates[0]) == pytest.approx(0.4 / float(soft.support.stiffness_x), rel=1e-6)
-    with pytest.raises(RuntimeError, match="force in its `extra` changes with the phase"):
-        jc.equilibrium(jc.replace(soft, extra=(Hidden(0.4),)), SPEED)
+    at = OWN.cage_at(jnp.asarray(SPEED)).forces(jnp.asarray(0.0), *map(jnp.asarray, run.state[0]))
+    assert float(at["ViscousDrag"][2]) == pytest.approx(-SHARE * 0.05**2 * SPEED, rel=1e-12)
+    assert float(at["contact"][2]) == 0
 
 
 # --- what is refused -------------------------------------------------------------------------

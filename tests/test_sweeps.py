@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from helpers import raw_sweep
-from literature import DUFFING_FOLDS
 
 import jaxcage as jc
 from jaxcage.analysis import summary
@@ -80,17 +79,6 @@ def test_labels_are_confirmed_by_finer_steps(followed):
     assert rough.attrs["confirmed"] == "[]"
     assert json.loads(sure.attrs["confirmed"])[0][1] >= np.sum(where) > 0
     assert np.all(sure["error"].values[where] < rough["error"].values[where])
-
-
-def test_run_up_and_run_down_show_the_hysteresis_of_a_hardening_oscillator():
-    """Between the folds of the hardening Duffing oscillator run-up stays on the large orbit and run-down on the small
-    one; outside they agree."""
-    speeds = np.linspace(1.1, 2.0, 37)
-    up, down = jc.run_up_down(HARDENING, speeds, start=(0.5, 0.0), discard=150, revolutions=20, method=FAST)
-    apart = np.abs(up["strobe"].mean("revolution") - down["strobe"].mean("revolution")).max("component")[:, 0] > 0.1
-    inside = (speeds > DUFFING_FOLDS["down"].value) & (speeds < DUFFING_FOLDS["up"].value)
-    assert np.array_equal(apart, inside)
-    assert np.all(up["label"] == "periodic-1")
 
 
 def test_ramp_follows_its_speed_and_agrees_with_steady_runs_when_slow():

@@ -8,7 +8,7 @@ import pytest
 from helpers import document, is_png
 
 import jaxcage as jc
-from jaxcage.design import Band, Ensemble, binomial_interval, misses, narrow, verdict_of
+from jaxcage.design import Ensemble, binomial_interval, misses, narrow, verdict_of
 from jaxcage.files import (
     ConfigError,
     Measurement,
@@ -33,9 +33,7 @@ def planted(chaotic: np.ndarray, place: np.ndarray) -> Ensemble:
     speeds = jc.rpm(5000, 9000, chaotic.shape[1])
     none = np.zeros(chaotic.shape, dtype=bool)
     sources = ("tap the cage", "measure its acceleration")
-    return Ensemble(
-        (STIFF, HIT), sources, place, speeds, chaotic, none, (Band("zone 1 onset", 0.5, (1.0, 2.0, 3.0)),), 100, 100
-    )
+    return Ensemble((STIFF, HIT), sources, place, speeds, chaotic, none, 100, 100)
 
 
 def by_stiffness(draws: int = 64) -> Ensemble:

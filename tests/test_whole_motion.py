@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from energies import cage_angular_momentum, kinetic_energy, potential_energy
 from helpers import beyond_range, read_columns
+from jax.flatten_util import ravel_pytree
 from PIL import Image
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 from test_whole_reference import everything
 
@@ -128,7 +130,7 @@ def test_rollers_that_do_not_slip():
     cage = SPEED * (r - h_i) / (r * (1 + h_i / h_o))
     off = 1e-3 * np.cos(np.arange(13))
     start = moving(model, radius=r, orbit=omega * (1 + off), spin=-cage * r / h_o * (1 - off), cage_speed=cage)
-    ran = jc.bearing_over_time(model, SPEED, np.array([0.0, 2e-3]), start=start, method=jc.native(1e-8, 1e-2))
+    ran = jc.simulate(model, SPEED, revolutions=1, samples=32, start=start, method=jc.native(1e-7, 1e-2))
     _, _, r, _, orbit = ran.rollers[-1]
     outer, inner = r + half - r_o, r_i + half - r
     h_o, h_i = half - outer / 2, half - inner / 2
@@ -199,6 +201,16 @@ def test_static_load():
         assert upward == pytest.approx(4450 + gravity * float(model.ring.ring_mass), rel=1e-9)
 
 
+def over_time(model, speed, start, seconds):
+    """A state so much later, by SciPy's integration of the rates over time: the engine counts the cage's angle."""
+    at = model.at_speed(jnp.asarray(speed))
+    first, unpack = ravel_pytree(start)
+    rate = eqx.filter_jit(lambda y: ravel_pytree(at.rates(unpack(y)).state)[0])
+    rates = lambda t, y: np.asarray(rate(jnp.asarray(y)))
+    done = solve_ivp(rates, (0.0, seconds), np.asarray(first), "DOP853", rtol=1e-10, atol=1e-14)
+    return unpack(jnp.asarray(done.y[:, -1]))
+
+
 @pytest.mark.wide
 def test_bounces():
     """Off a bar and off the outer raceway, both by ln[(1 + chi)/(1 - chi e)] = chi (1 + e) with chi = 1.5 alpha v0.
@@ -225,9 +237,7 @@ def test_bounces():
     lag[2], orbit[2] = 0.149e-3 / radius[2], speed / radius[2]
     radius[5], radial[5] = radius[5] + 8e-6, speed
     start = moving(model, spin=0.0, radius=radius, lag=lag, radial=radial, orbit=orbit)
-    ran = jc.bearing_over_time(model, 0.0, np.array([0.0, 1.4e-4]), start=start, method=jc.native(1e-9, 1e-2))
-    beta, _, r, back, turning = ran.rollers[-1]
-    assert ran.outcome == "successful"
+    beta, _, r, back, turning = over_time(model, 0.0, start, 1.4e-4).rollers
     along = back[2] * np.sin(beta[2]) + r[2] * turning[2] * np.cos(beta[2])
     for before, after in ((speed * np.cos(lag[2]), along), (speed, back[5])):
         chi = 1.5 * alpha * before
@@ -299,19 +309,14 @@ def test_a_cage_at_rest_is_not_followed_over_its_angle():
 
 
 @pytest.mark.wide
-def test_a_quasi_static_ring():
-    """It is where the contacts carry the load, and close to where a ring with mass is."""
-    dynamic, still = bearing(), bearing(**{"ring.ring_motion": "quasi_static"})
-    start = rolling_start(dynamic, SPEED, cage=1)
-    runs = [
-        jc.simulate(model, SPEED, revolutions=1, samples=32, start=start, method=jc.native(1e-6, 1e-2))
-        for model in (dynamic, still)
-    ]
-    assert [run.outcome for run in runs] == ["successful"] * 2
-    x, y = np.diff([run.bodies[8:, 5:7].mean(axis=0) for run in runs], axis=0)[0]
-    assert abs(x) < 0.3e-6 and abs(y) < 0.3e-6 and np.all(runs[1].bodies[:, 7:9] == 0)
-    slips = [jc.measures(dynamic, run).value("cage_slip") for run in runs]
-    assert slips[0] == pytest.approx(slips[1], rel=0.1)
+def test_a_revolution_of_a_stiff_bearing():
+    """A slow shaft in oil so cold that the film makes a cage at its land stiff: stability limits the steps, not the
+    error; the whole revolution is run, and its error is small."""
+    model, slow = bearing(temperature=273.15), jc.rpm(1000)
+    start = rolling_start(model, slow, cage=1)
+    place = np.array([0.0, 0.97 * float(model.clearance)])
+    run = jc.simulate(model, slow, revolutions=1, start=start._replace(bodies=start.bodies.at[:2].set(place)))
+    assert run.outcome == "successful" and run.error < 1e-2 and np.all(np.isfinite(run.state))
 
 
 @pytest.mark.slow

@@ -171,9 +171,10 @@ def test_measures_of_a_sweep_are_those_of_a_run(swept):
 
 
 def test_what_cannot_be_swept():
-    with pytest.raises(ValueError, match="dynamic"):
-        jc.sweep(bearing(**{"ring.ring_motion": "quasi_static"}), SPEED)
     model = bearing()
+    for method in (jc.method("rk4"), jc.native(pair="rodas4")):
+        with pytest.raises(ValueError, match="must be `native`"):
+            jc.sweep(model, SPEED, method=method)
     for options in ({"starts": 4}, {"blocks": 3}, {"exponents": 2}, {"discard": -1}):
         with pytest.raises(ValueError, match=next(iter(options))):
             jc.sweep(model, SPEED, **options)

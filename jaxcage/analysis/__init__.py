@@ -1,37 +1,18 @@
-"""Analysis: labels of lanes, zones of a sweep, survival of chaos, spectra, equilibrium, measures of a motion.
+"""Analysis: labels of lanes, zones of a sweep, survival of chaos, spectra, measures of a motion.
 
 | module        | responsibility                                                                       |
 |---------------|--------------------------------------------------------------------------------------|
 | `labels`      | periodic, chaotic, quasi-periodic, undecided or failed; the motion of a cage's centre |
-| `escapes`     | times at which lanes left chaos for good                                             |
-| `survival`    | an attractor or a chaotic transient: mean life with its error                        |
+| `survival`    | times at which lanes left chaos for good; its mean life, with an error               |
 | `hazard`      | the rate of escapes as it depends on speed and design                                |
 | `sweep`       | what the data set of a sweep says of its speeds                                      |
 | `zones`       | zones and both kinds of edge; stretches of speed with the same labels                |
 | `spectra`     | amplitude spectra by order of speed                                                  |
-| `equilibrium` | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
-| `rollers`     | rollers of a whole bearing along a time history, over time and around the bearing    |
+| `rollers`     | rollers of a whole bearing around its circumference; spectra with named lines        |
 | `measures`    | whirl ratio, displacement, film, forces, impulse, drag of a motion                   |
 """
 
 from .._arguments import check_layer
-from .equilibrium import (
-    LARGEST_WHIRLING as LARGEST_WHIRLING,
-    Equilibrium as Equilibrium,
-    attitude_angle as attitude_angle,
-    eccentricity_ratio as eccentricity_ratio,
-    equilibrium as equilibrium,
-    film_coefficients as film_coefficients,
-    film_whirl_speed as film_whirl_speed,
-    load_number as load_number,
-    whirl_threshold as whirl_threshold,
-)
-from .escapes import (
-    CONFIRM as CONFIRM,
-    calm_at_the_end as calm_at_the_end,
-    calm_threshold as calm_threshold,
-    escape_times as escape_times,
-)
 from .hazard import Hazard as Hazard, hazard as hazard
 from .labels import (
     CHAOS_THRESHOLD as CHAOS_THRESHOLD,
@@ -52,8 +33,6 @@ from .measures import (
     Measures as Measures,
     cage_forces as cage_forces,
     cage_history as cage_history,
-    cage_moments as cage_moments,
-    film_drag_power as film_drag_power,
     measures as measures,
     relative_state as relative_state,
 )
@@ -62,21 +41,24 @@ from .rollers import (
     NamedLine as NamedLine,
     RollerHistory as RollerHistory,
     around as around,
-    bearing_orders as bearing_orders,
     bearing_spectra as bearing_spectra,
     named_lines as named_lines,
     pocket_force_distribution as pocket_force_distribution,
-    roller_history as roller_history,
 )
 from .spectra import (
     OrderSpectrum as OrderSpectrum,
     Peak as Peak,
     dominant_orders as dominant_orders,
-    order_spectrum as order_spectrum,
     spectrum_of as spectrum_of,
-    whirl_spectrum as whirl_spectrum,
 )
-from .survival import Survival as Survival, survival as survival
+from .survival import (
+    CONFIRM as CONFIRM,
+    Survival as Survival,
+    calm_at_the_end as calm_at_the_end,
+    calm_threshold as calm_threshold,
+    escape_times as escape_times,
+    survival as survival,
+)
 from .sweep import (
     LIFE_BLOCK as LIFE_BLOCK,
     UNKNOWN as UNKNOWN,
@@ -109,6 +91,5 @@ from .zones import (
 
 check_layer(
     globals(),
-    "around cage_forces cage_moments equilibrium film_coefficients film_whirl_speed "
-    "measures order_spectrum survival zones",
+    "around cage_forces measures survival zones",
 )

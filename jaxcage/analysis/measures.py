@@ -8,11 +8,10 @@ from jaxtyping import Array, Float
 
 from .._arguments import require_x64
 from .._errors import ArgumentError
-from .._form import compiled
-from .._notebook import notebook_html
+from .._pytrees import compiled
 from ..forces import Force
 from ..models import CAGE_QUANTITIES, FORCES, AbstractForcedSystem, CageHistory, CageModel
-from ..quantities import Quantity, averaged
+from ..quantities import Quantity, averaged, notebook_html
 from ..solve import Trajectory
 from .labels import scatter
 
@@ -72,17 +71,6 @@ def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.
     return {name: np.stack(force[:2], axis=1) for name, force in _along(model, trajectory).items()}
 
 
-def cage_moments(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.ndarray, " n"]]:
-    """The moment of every force on the cage about its centre along a trajectory of `model`, counter-clockwise.
-
-    The cage turns at a speed that is given: moments enter no equation of motion. A moment times the speed is the power
-    that it gives the cage, for the film minus that of `film_drag_power`.
-
-    **Returns:** moments [N m] at every sample, by the names of `cage_forces`.
-    """
-    return {name: np.broadcast_to(force[2], len(trajectory.tau)) for name, force in _along(model, trajectory).items()}
-
-
 def _along(model: CageModel, trajectory: Trajectory) -> Histories:
     """Every force and moment at each sample."""
     require_x64()
@@ -95,24 +83,6 @@ def _along(model: CageModel, trajectory: Trajectory) -> Histories:
         forces = _forces(model, speed, tau, motion)
     names = (*FORCES, *(type(law).__name__ for law in model.extra))
     return {name: forces[name] for name in names}  # programs return a dictionary sorted
-
-
-def film_drag_power(
-    model: CageModel, speed: Float[np.ndarray, " n"], eps: Float[np.ndarray, " n"]
-) -> Float[np.ndarray, " n"]:
-    """Power [W] that shearing the film in all lands costs: torque times speed.
-
-    Torque of one land 2 pi mu omega R^3 L/(c sqrt(1 - eps^2)), the short bearing's; as the film
-    force, it keeps its value beyond the onset of contact. The gap is taken as full of oil at the
-    lubricant's own temperature: an upper bound where the land starves or warms up.
-
-    **Arguments:** model; speed [rad/s] and eccentricity ratio at each sample.
-    """
-    film, radius = model.film, float(model.land_radius)
-    kept = np.minimum(eps, float(model.contact.onset))
-    shear = float(model.lubricant.dynamic_viscosity) * radius**3 * float(film.land_width)
-    torque = 2 * np.pi * shear * speed / (float(model.clearance) * np.sqrt(1 - kept**2))
-    return film.n_lands * torque * speed
 
 
 class Measured(NamedTuple):
@@ -174,14 +144,14 @@ def _from_integrals(model: AbstractForcedSystem, trajectory: Trajectory) -> Meas
 def cage_history(model: CageModel, trajectory: Trajectory) -> CageHistory:
     """Motion of a cage along a trajectory, and the forces on it."""
     position, velocity = relative_state(model, trajectory.state)
-    eps = np.hypot(*position.T) / float(model.clearance)
+    along = _along(model, trajectory)
     return CageHistory(
         speed=trajectory.speed,
         phase=float(trajectory.tau[-1] - trajectory.tau[0]),
         position=position,
         velocity=velocity,
-        forces=cage_forces(model, trajectory),
-        drag_power=film_drag_power(model, trajectory.speed, eps),
+        forces={name: np.stack(force[:2], axis=1) for name, force in along.items()},
+        drag_power=-np.asarray(along["film"][2]) * trajectory.speed,
         clearance=float(model.clearance),
         peak=trajectory.peak,
         error=trajectory.error,

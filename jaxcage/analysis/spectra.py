@@ -1,19 +1,13 @@
 """Spectra by orders: multiples of the cage speed, so that order 1 is synchronous at every speed.
 
-A trajectory is sampled evenly in phase, so its spectrum is over orders even when the speed ramps.
+A time history is sampled evenly in phase, so that its spectrum is over orders even when the speed ramps.
 """
 
 import dataclasses
-from typing import Literal, NamedTuple, get_args
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Complex, Float
-
-from .._errors import ArgumentError
-from ..solve import Trajectory
-
-
-Window = Literal["hann", "flattop", "boxcar"]
+from jaxtyping import Float
 
 
 class Peak(NamedTuple):
@@ -25,18 +19,13 @@ class Peak(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class OrderSpectrum:
-    """Amplitudes by order of the speed.
-
-    One-sided (orders >= 0) for one component: a sine of amplitude a shows a. Two-sided for the
-    motion of a centre in the plane: a forward circle of radius a at w times the speed shows a at
-    order w, a backward one at order -w.
-    """
+    """Amplitudes by order of the speed, by a Hann window: a sine of amplitude a shows a, halfway between two bins 15 %
+    less."""
 
     order: Float[np.ndarray, " orders"]
     """Order, a multiple of the cage speed, ascending."""
     amplitude: Float[np.ndarray, " orders"]
-    """Amplitude in the unit of the component; the mean at order 0."""
-    window: Window
+    """Amplitude in the unit of the signal; the mean at order 0."""
 
     @property
     def resolution(self) -> float:
@@ -48,76 +37,20 @@ class OrderSpectrum:
         return float(self.amplitude[np.argmin(np.abs(self.order - order))])
 
 
-def _whole_revolutions(trajectory: Trajectory) -> Float[np.ndarray, "n dim"]:
-    """The last samples that make whole revolutions, so that integer orders fall on bins."""
-    revolutions = len(trajectory.tau) // trajectory.samples
-    if revolutions < 2:
-        raise ArgumentError(
-            "trajectory",
-            said="must last for at least 2 revolutions, "
-            f"but it has {len(trajectory.tau)} samples at {trajectory.samples} per revolution.",
-        )
-    return trajectory.state[-revolutions * trajectory.samples :]
-
-
-def _transform(
-    signal: Float[np.ndarray, " n"] | Complex[np.ndarray, " n"], window: Window
-) -> Complex[np.ndarray, " n"]:
-    """Windowed transform, scaled so that exp(i k x) with amplitude a gives |a| in its bin.
+def spectrum_of(signal: Float[np.ndarray, " n"], samples: int) -> OrderSpectrum:
+    """One-sided amplitude spectrum of a quantity at evenly spaced angles, up to half the samples per revolution.
 
     The mean is taken out first, which keeps its skirts out of the lowest orders, and put back.
-    """
-    if window not in get_args(Window):
-        choices = ", ".join(get_args(Window))
-        raise ArgumentError("window", said=f"must be one of {choices}, but '{window}' was given.")
-    from scipy.signal import get_window  # takes a second to import
 
-    weights = get_window(window, len(signal))
-    mean = np.sum(weights * signal) / np.sum(weights)
-    lines = np.fft.fft(weights * (signal - mean)) / np.sum(weights)
-    lines[0] = mean
-    return lines
-
-
-def order_spectrum(trajectory: Trajectory, component: int = 0, *, window: Window = "hann") -> OrderSpectrum:
-    """Amplitude spectrum of one component of the state.
-
-    **Arguments:**
-
-    - `trajectory`: at least 2 revolutions; only whole revolutions are used, the last ones.
-    - `component`: index into the state.
-    - `window`: `hann` tells near lines apart but shows a line halfway between two bins 15 % low;
-        `flattop` reads every amplitude to 0.1 % but is wide; `boxcar` is exact for integer orders
-        alone.
-
-    **Returns:** the one-sided spectrum, up to half the samples per revolution.
-
-    **Raises:** `ValueError` for a trajectory that is too short, or an unknown window.
-    """
-    return spectrum_of(_whole_revolutions(trajectory)[:, component], trajectory.samples, window)
-
-
-def spectrum_of(signal: Float[np.ndarray, " n"], samples: int, window: Window = "hann") -> OrderSpectrum:
-    """One-sided amplitude spectrum of a quantity at evenly spaced angles.
-
-    **Arguments:** values over whole revolutions; samples per revolution; window as in `order_spectrum`.
+    **Arguments:** values over whole revolutions, so that integer orders fall on bins; samples per revolution.
     """
     n = len(signal)
-    amplitude = np.abs(_transform(signal, window)[: n // 2 + 1])
+    weights = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)
+    mean = np.sum(weights * signal) / np.sum(weights)
+    amplitude = np.abs(np.fft.rfft(weights * (signal - mean))) / np.sum(weights)
+    amplitude[0] = abs(mean)
     amplitude[1 : (n + 1) // 2] *= 2  # the other half of a real line is at the negative order
-    return OrderSpectrum(np.fft.rfftfreq(n, 1 / samples), amplitude, window)
-
-
-def whirl_spectrum(
-    trajectory: Trajectory, components: tuple[int, int] = (0, 1), *, window: Window = "hann"
-) -> OrderSpectrum:
-    """Two-sided spectrum of x + i y: forward whirl at positive orders, backward at negative ones.
-
-    **Arguments:** as `order_spectrum`, with the two components that are x and y of a centre.
-    """
-    x, y = _whole_revolutions(trajectory)[:, list(components)].T
-    order = np.fft.fftshift(np.fft.fftfreq(len(x), 1 / trajectory.samples))
-    return OrderSpectrum(order, np.abs(np.fft.fftshift(_transform(x + 1j * y, window))), window)
+    return OrderSpectrum(np.fft.rfftfreq(n, 1 / samples), amplitude)
 
 
 def _hann_line(ratio: float) -> tuple[float, float]:
@@ -134,7 +67,7 @@ def _hann_line(ratio: float) -> tuple[float, float]:
 def dominant_orders(spectrum: OrderSpectrum, count: int = 5, *, floor: float | int = 0.01) -> tuple[Peak, ...]:
     """The largest lines of a spectrum, largest first, the mean left out.
 
-    With the Hann window order and amplitude are interpolated between the bins.
+    Order and amplitude are interpolated between the bins.
 
     **Arguments:** the spectrum; how many lines at most; the smallest amplitude that counts, as a
     part of the largest.
@@ -148,10 +81,8 @@ def dominant_orders(spectrum: OrderSpectrum, count: int = 5, *, floor: float | i
     peaks = peaks[a[peaks] >= floor * np.max(a[peaks])]
     lines = []
     for k in peaks:
-        shift, factor = 0.0, 1.0
         sign = 1 if a[k + 1] >= a[k - 1] else -1
-        if spectrum.window == "hann":
-            shift, factor = _hann_line(float(a[k + sign] / a[k]))
+        shift, factor = _hann_line(float(a[k + sign] / a[k]))
         place = order[k] + sign * shift * spectrum.resolution
         lines.append(Peak(float(place), float(a[k] * factor)))
     return tuple(sorted(lines, key=lambda line: -line.amplitude)[:count])

@@ -38,9 +38,9 @@ def resolution_rpm(found: xr.Dataset) -> float:
     return float(np.max(np.diff(rpm))) if rpm.size > 1 else float("inf")
 
 
-def restless(found: xr.Dataset) -> Bool[np.ndarray, " speeds"]:
+def restless(found: xr.Dataset) -> Bool[np.ndarray, "*speeds"]:
     """Speeds at which some lane is or was chaotic while observed."""
-    return np.asarray(np.isin(found["label"].values, ("chaotic", "transient")).any(axis=1))
+    return np.asarray(np.isin(found["label"].values, ("chaotic", "transient")).any(axis=-1))
 
 
 def survival_at(found: xr.Dataset, i: int) -> Survival:

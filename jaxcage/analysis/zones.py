@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Bool, Float
 
-from .._notebook import notebook_html
+from ..quantities import notebook_html
 from .labels import CHAOS_THRESHOLD
 from .sweep import chaotic_share, failed, lasting, resolution_rpm, restless, survival_at
 

@@ -11,7 +11,7 @@ from jaxtyping import Array
 from .._arguments import is_concrete, require_above_zero
 from .._errors import ArgumentError
 from .._parameters import count, parameter
-from .._types import Scalar
+from .._pytrees import Scalar
 from .line_contact import PALMGREN_CONSTANT, line_contact_stiffness, series_stiffness
 
 

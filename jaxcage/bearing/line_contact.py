@@ -6,7 +6,7 @@ import optimistix as optx
 from jaxtyping import Array
 
 from .._arguments import require_above_zero
-from .._types import Scalar
+from .._pytrees import Scalar
 
 
 LINE_CONTACT_EXPONENT = 10 / 9

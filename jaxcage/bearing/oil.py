@@ -15,7 +15,7 @@ from jaxtyping import Array
 from .._arguments import is_concrete, require_above_zero
 from .._errors import ArgumentError
 from .._parameters import ROUNDING, parameter
-from .._types import Scalar
+from .._pytrees import Scalar
 
 
 CELSIUS_40 = 313.15

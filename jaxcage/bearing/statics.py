@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from .._arguments import is_concrete, require_above_zero, require_at_least, require_x64
 from .._errors import ArgumentError
-from .._types import Scalar
+from .._pytrees import Scalar
 from .geometry import Bearing
 from .line_contact import line_contact_approach, raceway_loads_of_all
 

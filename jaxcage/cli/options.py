@@ -146,7 +146,7 @@ class StepOptions:
     """Options of the integration."""
 
     solver: OptionalText = None
-    """Integration method: rodas3, rodas4, rk4, newmark, tsit5, kvaerno3, kvaerno5, kencarp4."""
+    """Integration method: rk4, rodas4, tsit5."""
     steps: OptionalCount = None
     """Equal steps per revolution."""
     tolerance: Annotated[float | None, number()] = None

@@ -155,13 +155,12 @@ def said_of(found: Any, zones: Any) -> str:
 
 
 def chances(subject: Subject, over: o.Range, draws: int, seed: int, run: o.RunOptions, show: o.ShowOptions) -> Answer:
-    """Chances of chaos by speed, and bands of the edges, of a file with ranges."""
+    """Chances of chaos by speed, of a file with ranges."""
     with show.computing(f"draws of {subject.name}") as progress:
         found = draw(subject, subject.range(over, 40), draws, seed, run, progress)
     if found.failed.all():
         raise NoResult(f"All {found.failed.size} simulations failed: try more steps (--steps), or narrower ranges.")
-    title, bands = f"{subject.name}: {draws} draws", [(band.name, band.rpm) for band in found.bands]
-    chance = found.rpm, found.chance, found.interval, bands
+    title, chance = f"{subject.name}: {draws} draws", (found.rpm, found.chance, found.interval)
     columns = {f"{key.replace('_rpm', '').replace('_', ' ')} [rpm]": x for key, x in subject.both(found.speed).items()}
     columns |= dict(zip(("chance of chaos", "lower", "upper"), (found.chance, *found.interval), strict=True))
     figure = jc.show.drawn(lambda ax: jc.show.chance_of_chaos(*chance, ax), title=title)
@@ -265,7 +264,7 @@ def _measured(subject: Subject, found: Any) -> Any:
     if subject.with_rollers:
         return found
     loads, dims = jc.design.land_loads(subject.model, found), ("speed", "start")
-    about = {"orbit_size": (jc.design.motions(subject.model, found).size, "m")}
+    about = {"orbit_size": (jc.design.motions(subject.model, found)[0], "m")}
     about |= {f"{n.replace(' ', '_')}": (loads[n], u) for n, u in (("peak land force", "N"), ("wear load", "N m/s"))}
     words = lambda name, unit: {"units": unit, "long_name": name.replace("_", " ")}
     return found.assign({name: (dims[: x.ndim], x, words(name, unit)) for name, (x, unit) in about.items()})

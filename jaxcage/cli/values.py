@@ -1,7 +1,6 @@
 """`NAME=VALUES` of options read into numbers: a grid, single values, an interval, a tolerance, with units."""
 
 import itertools
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -58,24 +57,6 @@ def read_bounds(given: Sequence[str], subject: Subject) -> dict[str, tuple[float
     found = read_each("--vary", given, "a parameter's NAME=LOWER:UPPER", read)
     _check_corners(found, subject)
     return {name: between.bounds for name, between in found.items()}
-
-
-def read_scatter(names: Sequence[str], name: str, law: str) -> Callable[[np.ndarray], np.ndarray]:
-    """Manufacturing scatter of one of `names`: `10%` (evenly within so much of the value) or `rayleigh`.
-
-    **Raises:** `ValueError` with the words that follow the name.
-    """
-    if name not in names:
-        raise InputError(f"Option --scatter must name one of {', '.join(names)}, but '{name}={law}' was given.")
-    if law == "rayleigh":
-        return jc.design.rayleigh()
-    try:
-        share = float(law.removesuffix("%")) / 100 if law.endswith("%") else math.nan
-    except ValueError:
-        share = math.nan
-    if not 0 < share < 1:
-        raise ValueError(f"must be a share such as 10% or rayleigh, but '{law}' was given.")
-    return jc.design.uniform(share)
 
 
 def no_worse_balance(model: Any, vary: dict[str, tuple[float, float]]) -> list[str]:

@@ -1,17 +1,19 @@
-"""Designs: objectives, statistics, slopes and searches, chances and identification of unknown parameters.
+"""Designs: calm operation by exact gradients; statistics of runs, slopes, shares of variance, unknown parameters.
 
 | module           | responsibility                                                                          |
 |------------------|-----------------------------------------------------------------------------------------|
-| `objective`      | design space, objectives that add up, manufacturing scatter                             |
+| `search`         | the cheapest design that keeps its requirements over an operating range                 |
+| `requirements`   | limits that a design must keep, and what it costs                                       |
+| `operating`      | edges and orbits of an operating range, with exact derivatives by the design            |
+| `unstable_width` | width of unstable ranges as an objective                                                |
+| `tolerance`      | what manufacture makes of a design: worst corners, budgets                              |
+| `check`          | simulations of a design from many initial states                                        |
+| `surrogate`      | search for a better design by a Gaussian process                                        |
 | `statistics`     | chaotic speeds, quantities, loads of designs, read off one sweep; two designs compared  |
 | `loads`          | loads of the guiding land, size and whirl of the motion                                 |
-| `edges`          | exact objectives: edges that are followed, margins of stability                         |
-| `lasting`        | edges of lasting chaos with their gradients, by survival regression                     |
-| `widths`         | widths of zones between edges of any kind                                               |
-| `slopes`         | slopes of statistics by paired designs                                                  |
-| `shares`         | Sobol indices, tolerance budgets                                                        |
-| `optimisation`   | searches by gradient and by a Gaussian process                                          |
-| `checkpoint`     | the state of a search in a file                                                         |
+| `survival_edges` | edges of lasting chaos with their gradients, by survival regression; widths of zones    |
+| `paired_designs` | slopes of statistics by paired designs; tolerance budgets                               |
+| `variance`       | Sobol indices                                                                           |
 | `chances`        | chances of chaos of a cage that is known within ranges only                             |
 | `identification` | ranges narrowed by measurements                                                         |
 """
@@ -19,59 +21,27 @@
 from .._arguments import check_layer
 from .chances import (
     REVOLUTIONS as REVOLUTIONS,
-    Band as Band,
     Clue as Clue,
     Ensemble as Ensemble,
     binomial_interval as binomial_interval,
-    chaotic_shares as chaotic_shares,
-    draw as draw,
     ensemble as ensemble,
     verdict_of as verdict_of,
 )
-from .identification import Narrowed as Narrowed, identify as identify, misses as misses, narrow as narrow
-from .lasting import LastingEdge as LastingEdge, lasting_edge as lasting_edge, lasting_edges as lasting_edges
-from .loads import (
-    LAND_LOADS as LAND_LOADS,
-    Motion as Motion,
-    averages as averages,
-    land_loads as land_loads,
-    motions as motions,
-)
-from .objective import (
-    COSTS as COSTS,
-    AbstractObjective as AbstractObjective,
-    DesignSpace as DesignSpace,
-    Measured as Measured,
-    Price as Price,
-    Robust as Robust,
-    Scatter as Scatter,
-    Smooth as Smooth,
-    cost as cost,
-    rayleigh as rayleigh,
-    uniform as uniform,
-)
-from .optimisation import (
-    Optimised as Optimised,
-    Optimum as Optimum,
-    SurrogateSearch as SurrogateSearch,
-    confirmed as confirmed,
-    optimise as optimise,
-    surrogate_search as surrogate_search,
-)
-from .shares import (
-    SobolIndices as SobolIndices,
-    ToleranceBudget as ToleranceBudget,
-    global_sensitivity as global_sensitivity,
-    sobol_of as sobol_of,
-    tolerance_budget as tolerance_budget,
-)
-from .slopes import (
+from .check import Checked as Checked, check_design as check_design
+from .identification import Narrowed as Narrowed, misses as misses, narrow as narrow
+from .loads import LAND_LOADS as LAND_LOADS, land_loads as land_loads, motions as motions
+from .operating import DesignSpace as DesignSpace, OperatingRange as OperatingRange, Value as Value
+from .paired_designs import (
     DIRECTIONS as DIRECTIONS,
     MeanGradient as MeanGradient,
     StatisticGradient as StatisticGradient,
+    ToleranceBudget as ToleranceBudget,
     gradient_of_pairs as gradient_of_pairs,
     mean_gradient as mean_gradient,
+    tolerance_budget as tolerance_budget,
 )
+from .requirements import COSTS as COSTS, Price as Price, Requirements as Requirements, cost_function as cost_function
+from .search import Design as Design, Trial as Trial, design_for as design_for
 from .statistics import (
     BALANCE as BALANCE,
     BEARING_MEASURES as BEARING_MEASURES,
@@ -80,19 +50,26 @@ from .statistics import (
     OBJECTIVE as OBJECTIVE,
     STATISTICS as STATISTICS,
     BeforeAfter as BeforeAfter,
-    Chaos as Chaos,
-    LandLoad as LandLoad,
-    Mean as Mean,
     Runs as Runs,
+    Statistic as Statistic,
     bearing_objective as bearing_objective,
     before_and_after as before_and_after,
-    chaotic_share as chaotic_share,
     chaotic_width as chaotic_width,
-    measure as measure,
-    relative as relative,
+    drawn_states as drawn_states,
     statistic as statistic,
 )
-from .widths import SolvedEdge as SolvedEdge, ZoneWidth as ZoneWidth, zone_width as zone_width
+from .surrogate import Optimum as Optimum, SurrogateSearch as SurrogateSearch, surrogate_search as surrogate_search
+from .survival_edges import (
+    LastingEdge as LastingEdge,
+    SolvedEdge as SolvedEdge,
+    ZoneWidth as ZoneWidth,
+    lasting_edge as lasting_edge,
+    lasting_edges as lasting_edges,
+    zone_width as zone_width,
+)
+from .tolerance import Budget as Budget, Tolerance as Tolerance
+from .unstable_width import UnstableWidth as UnstableWidth
+from .variance import SobolIndices as SobolIndices, global_sensitivity as global_sensitivity
 
 
-check_layer(globals(), "global_sensitivity mean_gradient optimise tolerance_budget")
+check_layer(globals(), "design_for global_sensitivity mean_gradient surrogate_search tolerance_budget")

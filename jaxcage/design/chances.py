@@ -6,7 +6,7 @@ the draws are independent, so that their chaotic share has the error bar of a bi
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
-from ..analysis import chaotic_share, failed, restless, zones
+from ..analysis import failed, restless
 from ..files import Unknown, check_together
 from ..lanes import Progress, sobol, sweep
 from ..models import CageModel
@@ -37,30 +37,15 @@ CONFIDENCE = 0.95
 BINS = 4
 """Parts of a range whose chances are compared, to tell how much an unknown explains."""
 
-
 Verdict = Literal["calm", "chaotic", "calm as computed", "chaotic as computed", "not decided", "too few draws"]
 
 
-@dataclasses.dataclass(frozen=True)
-class Band:
-    """Speeds between which an edge lies."""
-
-    name: str
-    share: float
-    """Share of the draws that have this edge."""
-    rpm: tuple[float, float, float]
-    """Speeds below which 5 %, 50 % and 95 % of the draws that have it lie."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Clue:
-    """Influence of an unknown on the verdict."""
+class Clue(NamedTuple):
+    """Share of the variance of the chaotic share that is due to an unknown alone, and `source`, how to measure it."""
 
     label: str
     share: float
-    """Share of the variance of the chaotic share that is due to it alone, as far as the draws can tell."""
     source: str
-    """How to measure it."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,7 +62,6 @@ class Ensemble:
     chaotic: Bool[np.ndarray, "draws speeds"]
     """True where a draw is chaotic while observed."""
     failed: Bool[np.ndarray, "draws speeds"]
-    bands: tuple[Band, ...]
     discard: int
     revolutions: int
     units: tuple[str, ...] = ()
@@ -123,9 +107,8 @@ class Ensemble:
         y = np.mean(self.chaotic[:, chosen], axis=1) if np.any(chosen) else np.zeros(len(self.chaotic))
         if np.ptp(y) == 0:
             return []
-        shares = [_explained(self.place[:, i], y) for i in range(len(self.unknowns))]
-        found = [Clue(u.label, s, of) for u, s, of in zip(self.unknowns, shares, self.sources, strict=True)]
-        return sorted(found, key=lambda clue: -clue.share)
+        each = zip(self.unknowns, self.place.T, self.sources, strict=True)
+        return sorted((Clue(u.label, _explained(at, y), of) for u, at, of in each), key=lambda clue: -clue.share)
 
     def between(self, low_rpm: float, high_rpm: float) -> Bool[np.ndarray, " speeds"]:
         """Speeds in a range, or the one that is nearest to it."""
@@ -138,8 +121,7 @@ def verdict_of(chaotic: int, finished: int, draws: int) -> Verdict:
 
     `calm` and `chaotic` hold whatever the draws that failed would do: at most 5 %, or at least 95 %, of all draws are
     chaotic then. `calm as computed` and `chaotic as computed` are about the draws that finished; those that failed are
-    often the ones that hit the land hardest, and others drawn in their place would not be like them. `not decided` is
-    in between.
+    often the ones that hit the land hardest, and others drawn in their place would not be like them.
     """
     if finished < FEWEST:
         return "too few draws"
@@ -173,8 +155,20 @@ def _explained(place: np.ndarray, y: np.ndarray) -> float:
     return float(max(between - noise, 0.0) / (between + within))
 
 
-def draw(model: CageModel, unknowns: Sequence[Unknown], place: Float[np.ndarray, "draws unknowns"]) -> list[CageModel]:
-    """Designs with the values at `place` in the ranges.
+def run_draws(
+    model: CageModel,
+    unknowns: Sequence[Unknown],
+    place: Float[np.ndarray, "draws unknowns"],
+    speeds: Float[np.ndarray, " speeds"],
+    *,
+    discard: int = REVOLUTIONS,
+    revolutions: int = REVOLUTIONS,
+    blocks: int = 20,
+    method: AbstractMethod | None = None,
+    progress: Progress | None = None,
+) -> tuple[list[CageModel], xr.Dataset]:
+    """Designs with the values at `place` in the ranges, and their sweep, each from its own conventional initial state:
+    a state in which the cage of one design rests on its rib would press that of another into it.
 
     **Raises:** `ValueError` for values that do not go together.
     """
@@ -183,7 +177,9 @@ def draw(model: CageModel, unknowns: Sequence[Unknown], place: Float[np.ndarray,
         values = {name: float(u.range.at(p)) for u, p in zip(unknowns, row, strict=True) for name in u.names}
         models.append(replace(model, **values))
         check_together(models[-1])
-    return models
+    length: Any = dict(discard=discard, revolutions=revolutions, blocks=blocks, confirm=False, horizon=0, keep=32)
+    settled, method = SETTLED if discard >= SETTLED else 0, native(error=ERROR) if method is None else method
+    return models, sweep(models, speeds, starts=1, settled=settled, method=method, progress=progress, **length)
 
 
 def ensemble(
@@ -204,85 +200,14 @@ def ensemble(
     **Arguments:** design; what is unknown of it; ascending speeds [rad/s]; number and seed of the draws (scrambled
     Sobol points); revolutions left out and observed in `blocks` blocks; method and progress as in `sweep`.
 
-    **Returns:** `Ensemble`.
-
     **Raises:** `ValueError` if nothing is unknown, nothing is drawn, or values from the ranges do not go together.
     """
     if not unknowns:
         raise ArgumentError("unknowns", said="must hold at least one range, but it is empty.")
     require_at_least(1, draws=draws)
-    place = sobol(len(unknowns), draws, seed)
-    found = run_draws(draw(model, unknowns, place), speeds, method, progress, discard, revolutions, blocks)
-    info = parameter_info(model)
-    return Ensemble(
-        tuple(unknowns),
-        tuple(info[u.names[0]].source for u in unknowns),
-        place,
-        np.asarray(speeds, dtype=float),
-        np.array([restless(each) for each in found]),
-        np.array([failed(each)[:, 0] for each in found]),
-        tuple(_bands(found)),
-        discard,
-        revolutions,
-        tuple(info[u.names[0]].unit for u in unknowns),
-    )
-
-
-def run_draws(
-    models: Sequence[CageModel],
-    speeds: Float[np.ndarray, " speeds"],
-    method: AbstractMethod | None,
-    progress: Progress | None,
-    discard: int = REVOLUTIONS,
-    revolutions: int = REVOLUTIONS,
-    blocks: int = 20,
-) -> list[xr.Dataset]:
-    """The sweep of each design, from its own conventional initial state: a state in which the cage of one design rests
-    on its rib would press that of another into it."""
-    found = sweep(
-        models,
-        speeds,
-        starts=1,
-        discard=discard,
-        revolutions=revolutions,
-        confirm=False,
-        horizon=0,
-        blocks=blocks,
-        keep=32,
-        settled=SETTLED if discard >= SETTLED else 0,
-        method=native(error=ERROR) if method is None else method,
-        progress=progress,
-    )
-    return [found.isel(design=i) for i in range(len(models))]
-
-
-def chaotic_shares(
-    model: CageModel,
-    unknowns: Sequence[Unknown],
-    speeds: Float[np.ndarray, " speeds"],
-    place: np.ndarray,
-    *,
-    method: AbstractMethod | None = None,
-    progress: Progress | None = None,
-) -> np.ndarray:
-    """Share of the speeds at which each draw is chaotic; a lane that failed counts as the others of its draw do."""
-    flat = place.reshape(len(unknowns), -1)
-    models = draw(model, unknowns, flat.T)
-    found = run_draws(models, speeds, method, progress)
-    shares = [float(np.nanmean(chaotic_share(each))) if not np.all(failed(each)) else 0.0 for each in found]
-    return np.array(shares).reshape(1, *place.shape[1:])
-
-
-def _bands(found: Sequence[xr.Dataset]) -> list[Band]:
-    """Where the ends of the first two zones of each draw are."""
-    places: dict[str, list[float]] = {f"zone {i} {end}": [] for i in (1, 2) for end in ("onset", "exit")}
-    for swept in found:
-        for i, zone in enumerate(zones(swept).zones[:2], start=1):
-            for end, edge in (("onset", zone.onset), ("exit", zone.exit)):
-                if edge is not None:
-                    places[f"zone {i} {end}"].append(edge.speed_rpm)
-    return [
-        Band(name, len(rpm) / len(found), tuple(map(float, np.quantile(rpm, (0.05, 0.5, 0.95)))))  # pyright: ignore[reportArgumentType]
-        for name, rpm in places.items()
-        if rpm
-    ]
+    place, info = sobol(len(unknowns), draws, seed), parameter_info(model)
+    length: Any = dict(discard=discard, revolutions=revolutions, blocks=blocks)
+    _, found = run_draws(model, unknowns, place, speeds, method=method, progress=progress, **length)
+    rough, lost, at = restless(found), failed(found)[..., 0], np.asarray(speeds, dtype=float)
+    sources, units = zip(*((info[u.names[0]].source, info[u.names[0]].unit) for u in unknowns), strict=True)
+    return Ensemble(tuple(unknowns), sources, place, at, rough, lost, discard, revolutions, units)

@@ -7,12 +7,12 @@ import numpy as np
 from jaxtyping import Float
 
 from ..analysis import failed, restless, survival_at
-from ..lanes import initial_states, sobol, sweep
+from ..lanes import initial_states, sweep
 from ..models import AbstractForcedSystem
+from .statistics import drawn_states
 
 
-SPEEDS, SPREAD = 24, 0.6
-"""Speeds of the check, and the part of the scale over which initial states are spread beside the model's own."""
+SPEEDS = 24  # of the check
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,9 +63,7 @@ def check_design(
     """
     speeds = np.linspace(*operating, SPEEDS)
     own = np.asarray(initial_states(model, speeds, None))[:, :starts]
-    scale = np.array([[float(c) for c in model.scale(s)] for s in speeds])
-    drawn = SPREAD * (2 * sobol(scale.shape[1], max(starts - own.shape[1], 1), 0) - 1)[: starts - own.shape[1]]
-    states = np.concatenate([own, drawn * scale[:, None]], axis=1)
+    states = np.concatenate([own, drawn_states(model, speeds, starts - own.shape[1], 0)], axis=1)
     told = (lambda done, of: progress("check", done, of)) if progress else None
     found = sweep(model, speeds, starts=states, progress=told)
     labels, counts = np.unique(found["label"].values, return_counts=True)

@@ -10,10 +10,8 @@ held the truth.
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Bool, Float
 
 from .._arguments import require_at_least
@@ -23,7 +21,7 @@ from ..files import Measurement, Range, Unknown
 from ..lanes import Progress, sobol
 from ..models import CageModel
 from ..solve import AbstractMethod, native
-from .chances import ERROR, draw, run_draws
+from .chances import ERROR, run_draws
 from .loads import motions
 
 
@@ -37,9 +35,7 @@ more, so that a tight tolerance tells near draws from far ones."""
 FEW = 8
 """Accepted draws without which even the last stage closes around the best ones, met or not."""
 WHOLE = 0.9
-"""Share of a range above which a stage leaves it whole."""
-WORTH = 0.9
-"""A range that keeps more of its length is left as it is."""
+"""Share of a range above which it is left whole."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,11 +58,6 @@ class Narrowed:
     """How far the best draw is from each measurement, in tolerances."""
 
     @property
-    def met(self) -> bool:
-        """True if any draw meets all measurements."""
-        return self.accepted > 0
-
-    @property
     def share(self) -> Float[np.ndarray, " unknowns"]:
         """Share of each range that is left."""
         return self.upper - self.lower
@@ -74,7 +65,7 @@ class Narrowed:
     @property
     def narrowed(self) -> Bool[np.ndarray, " unknowns"]:
         """True for ranges that become shorter by more than a tenth."""
-        return self.share < WORTH
+        return self.share < WHOLE
 
     @property
     def ranges(self) -> tuple[Range, ...]:
@@ -94,7 +85,8 @@ def narrow(
 ) -> Narrowed:
     """Close ranges around the draws that meet the measurements.
 
-    **Arguments:** ranges; how far draws are from the measurements; draws of each stage; largest number of stages; seed.
+    **Arguments:** ranges; function of places in them, such as `misses`, that tells how far draws are from the
+    measurements; draws of each stage; largest number of stages; seed.
 
     **Raises:** `ValueError` if nothing is unknown, or for fewer than 16 draws.
     """
@@ -108,7 +100,7 @@ def narrow(
         place = lower + (upper - lower) * sobol(len(unknowns), draws, seed + stage)
         missed = np.where(np.isnan(far := misses(place)), math.inf, far)
         met = np.all(missed <= 1.0, axis=1)
-        far_off = np.mean(_counted(missed), axis=1)
+        far_off = np.mean(FAR * (1 - 1 / (1 + missed / FAR)), axis=1)  # a miss counts at most FAR
         enough = met.sum() >= KEPT * draws
         last = enough or stage == stages
         worst_kept = np.sort(far_off)[math.ceil(KEPT * draws) - 1]
@@ -120,11 +112,6 @@ def narrow(
             return Narrowed(tuple(unknowns), lower, upper, middle, int(met.sum()), draws, stage, best)
 
 
-def _counted(missed: np.ndarray) -> np.ndarray:
-    """Count of a miss: the miss itself where it is small, and at most `FAR`."""
-    return FAR * (1 - 1 / (1 + missed / FAR))
-
-
 def _closed(place: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Ends around these places, some distances of even draws beyond the outermost; a range of which they leave most
     stays whole, since nothing was learned of it."""
@@ -133,26 +120,6 @@ def _closed(place: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[np
     low, high = np.maximum(low - margin, lower), np.minimum(high + margin, upper)
     whole = high - low > WHOLE * (upper - lower)
     return np.where(whole, lower, low), np.where(whole, upper, high)
-
-
-def identify(
-    model: CageModel,
-    unknowns: Sequence[Unknown],
-    measured: Sequence[Measurement],
-    *,
-    draws: int = DRAWS,
-    stages: int = STAGES,
-    seed: int = 0,
-    method: AbstractMethod | None = None,
-    progress: Progress | None = None,
-) -> Narrowed:
-    """Narrow the ranges of a file by measurements on the machine.
-
-    **Arguments:** design; its unknowns; measurements; draws of each stage; largest number of stages; seed of the draws;
-    method and progress as in `sweep`.
-    """
-    missed_by = lambda place: misses(model, unknowns, measured, place, method=method, progress=progress)
-    return narrow(unknowns, missed_by, draws=draws, stages=stages, seed=seed)
 
 
 def misses(
@@ -166,21 +133,17 @@ def misses(
 ) -> Float[np.ndarray, "draws measurements"]:
     """Distance of each draw from each measurement, in tolerances; NaN where it failed. A cage that is chaotic rattles:
     its distance is 0 if that is right, else `FAR`."""
-    models = draw(model, unknowns, place)
     rpm = np.unique([m.cage_rpm for m in measured])
-    found = run_draws(models, rpm * np.pi / 30, method, progress)
-    lost, rattles = (np.array([of(each) for each in found]) for of in (lambda each: failed(each)[:, 0], restless))
-    moved: Any = None
-    if any(m.quantity in ("orbit size", "whirl frequency") for m in measured):
-        moved = motions(models, xr.concat(found, "design"), method=native(error=ERROR))
+    models, found = run_draws(model, unknowns, place, rpm * np.pi / 30, method=method, progress=progress)
+    size, order = motions(models, found, method=native(error=ERROR))
     columns = []
     for m in measured:
         i = int(np.argmin(np.abs(rpm - m.cage_rpm)))
         if m.quantity in ("rattles", "calm"):
-            right = rattles[:, i] == (m.quantity == "rattles")
-            columns.append(np.where(lost[:, i], np.nan, np.where(right, 0.0, FAR)))
+            right = restless(found)[:, i] == (m.quantity == "rattles")
+            columns.append(np.where(failed(found)[:, i, 0], np.nan, np.where(right, 0.0, FAR)))
             continue
         whirl = m.quantity == "whirl frequency"
-        value = np.abs(moved.whirl_order[:, i, 0]) * m.cage_rpm / 60 if whirl else moved.size[:, i, 0]
+        value = np.abs(order[:, i, 0]) * m.cage_rpm / 60 if whirl else size[:, i, 0]
         columns.append(np.abs(value - m.value) / m.tolerance)
     return np.stack(columns, axis=1)

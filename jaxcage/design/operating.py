@@ -18,8 +18,8 @@ from jaxtyping import Array, Float
 from scipy.optimize import minimize_scalar
 
 from .._errors import InputError
-from .._form import compiled
-from .._parameters import replace
+from .._parameters import parameters, replace
+from .._pytrees import compiled
 from ..models import AbstractForcedSystem
 from ..orbits import (
     Branch,
@@ -36,7 +36,7 @@ from ..orbits import (
 )
 from ..solve import REVOLUTION, AbstractMethod, strobe_map
 from .loads import land_reading
-from .objective import DesignSpace
+from .surrogate import Bounds, checked_bounds
 
 
 MOST_PARTS = 4096  # most phases of a revolution at which an orbit is read; else there are as many as its steps
@@ -59,18 +59,41 @@ class Value(NamedTuple):
     rpm: float = float("nan")
 
 
-class Designs(eqx.Module):
-    """The design at a place between the bounds of a design space, as a function that JAX differentiates."""
+class DesignSpace(eqx.Module):
+    """A design, the parameters that may change, and their bounds: a function from a place between the bounds, 0 to 1 in
+    each parameter, to the design there, which JAX differentiates."""
 
     system: AbstractForcedSystem
-    lower: Float[Array, " n"]
-    span: Float[Array, " n"]
+    lower: Float[np.ndarray, " n"]
+    """Smallest values [SI]."""
+    span: Float[np.ndarray, " n"]
+    """Distances of the bounds [SI]."""
     names: tuple[str, ...] = eqx.field(static=True)
 
     @classmethod
-    def of(cls, space: DesignSpace) -> "Designs":
-        """The designs of a space."""
-        return cls(space.system, jnp.asarray(space.lower), jnp.asarray(space.span), space.names)
+    def of(cls, system: AbstractForcedSystem, vary: Bounds) -> "DesignSpace":
+        """The space within bounds. **Raises:** `ValueError` for bounds that make no sense."""
+        checked_bounds(system, vary)
+        low, high = np.array(list(vary.values()), dtype=float).T
+        return cls(system, low, high - low, tuple(vary))
+
+    @property
+    def place(self) -> Float[np.ndarray, " n"]:
+        """Place of the design itself."""
+        known = parameters(self.system)
+        return (np.array([float(known[name]) for name in self.names]) - self.lower) / self.span
+
+    def values(self, place: Float[np.ndarray, " n"]) -> dict[str, float]:
+        """Parameters [SI] at a place."""
+        return dict(zip(self.names, (self.lower + place * self.span).tolist(), strict=True))
+
+    def model(self, place: Float[np.ndarray, " n"]) -> AbstractForcedSystem:
+        """The design at a place."""
+        return replace(self.system, **self.values(place))
+
+    def slope_of(self, derivative: Mapping[str, float]) -> Float[np.ndarray, " n"]:
+        """Derivatives by the place, from derivatives by the parameters [SI]."""
+        return np.array([derivative[name] for name in self.names]) * self.span
 
     def __call__(self, place: Float[Array, " n"]) -> AbstractForcedSystem:
         values = self.lower + place * self.span
@@ -78,7 +101,7 @@ class Designs(eqx.Module):
 
 
 @compiled
-def function_value(function: Callable[[Any], Any], designs: Designs, place: Array) -> tuple[Array, Array]:
+def function_value(function: Callable[[Any], Any], designs: DesignSpace, place: Array) -> tuple[Array, Array]:
     """Return a function of the design and its derivatives by the place."""
     f = lambda x: jnp.asarray(function(designs(x)), dtype=float)
     slope, value = jax.jacfwd(lambda x: (f(x),) * 2, has_aux=True)(place)
@@ -96,7 +119,7 @@ def _readings(system: Any, speed: Array, state: Array, method: AbstractMethod, p
     def part(i: Array, carry: tuple) -> tuple:
         y, seen = carry
         tau = i.astype(float) * (REVOLUTION / parts.astype(float))
-        seen = seen.at[i].set(jnp.stack([jnp.asarray(x, float) for x in land_reading(system, speed, tau, y)]))
+        seen = seen.at[i].set(land_reading(system, speed, tau, jnp.stack(y)))
         return strobe.part(y, i, parts).y, seen
 
     start = tuple(state[i] for i in range(state.size)), jnp.zeros((MOST_PARTS, 3))
@@ -110,13 +133,15 @@ def _readings(system: Any, speed: Array, state: Array, method: AbstractMethod, p
 
 
 @compiled
-def _read(designs: Designs, place: Array, speed: Array, state: Array, method: AbstractMethod, parts: Array) -> Array:
+def _read(
+    designs: DesignSpace, place: Array, speed: Array, state: Array, method: AbstractMethod, parts: Array
+) -> Array:
     return _readings(designs(place), speed, state, method, parts)
 
 
 @compiled
 def _read_moved(
-    designs: Designs, place: Array, speed: Array, state: Array, moves: Array, method: AbstractMethod, parts: Array
+    designs: DesignSpace, place: Array, speed: Array, state: Array, moves: Array, method: AbstractMethod, parts: Array
 ) -> Array:
     """Return the derivatives of the readings by the place, the orbit moving with it."""
     at = lambda x: _readings(designs(x), speed, state + moves @ (x - place), method, parts)
@@ -157,7 +182,7 @@ class OperatingRange:
         self.limits = REACH[0] * low, REACH[1] * high
         self.wider = (1 - self.margin / 100) * low, (1 + self.margin / 100) * high
         self._through: dict[bytes, Branch | None] = {}
-        self.designs, self.handed_over = Designs.of(self.space), list[str]()
+        self.handed_over = list[str]()
         found = stable_range(self.space.system, self.operating, self.limits, method=self.method)
         if found is None:
             raise InputError(
@@ -212,26 +237,22 @@ class OperatingRange:
         found = search([guess]) or search()
         if found is None:
             return "no stable orbit in the operating range"
-        anchor = self._anchor(place, found)
+        try:
+            anchor = self._anchor(place, found)
+        except InputError as error:
+            return str(error)
         known = {name: point for name, point in anchor.edges.items() if point is not None}
-        solved = follow_all(model, known, model, self.limits, self.method)
-        if lost := [name for name, f in solved.items() if f.edge is None]:
+        solved = {name: f.edge for name, f in follow_all(model, known, model, self.limits, self.method).items()}
+        if lost := [name for name, edge in solved.items() if edge is None]:
             return f"the {' and '.join(lost)} edge is not located"
         self._anchors.append(anchor)
         for name in anchor.edges:
-            f = edges.get(name)
-            if (
-                f is None
-                or f.edge is None
-                or name not in solved
-                or abs(f.edge.value_rpm - solved[name].edge.value_rpm) > 1
-            ):
-                why = f.ended if f is not None and f.ended else "orbits between became unstable"
-                now = (
-                    "open" if name not in solved else f"{solved[name].edge.value_rpm:.0f} rpm, {solved[name].edge.kind}"
-                )
-                self.handed_over.append(f"{name} edge: {why}; now {now}")
-        return {name: solved[name].edge if name in solved else None for name in anchor.edges}
+            old, now = edges[name].edge if name in edges else None, solved.get(name)
+            if old is None or now is None or abs(old.value_rpm - now.value_rpm) > 1:
+                why = (edges[name].ended if name in edges else "") or "orbits between became unstable"
+                there = "open" if now is None else f"{now.value_rpm:.0f} rpm, {now.kind}"
+                self.handed_over.append(f"{name} edge: {why}; now {there}")
+        return {name: solved.get(name) for name in anchor.edges}
 
     def margins(self, place: Float[np.ndarray, " n"]) -> dict[str, Value] | str:
         """Distances of both ends of the operating range from the edges [per cent of the end's speed], negative where
@@ -278,11 +299,9 @@ class OperatingRange:
 
     def _between(self, through: Branch, edges: Mapping[str, Sensitivity | None]) -> tuple[np.ndarray, np.ndarray]:
         """Speeds of a branch between the edges, ascending, and the sizes of the largest multipliers there."""
-        low, high = self.wider
-        low, high = (
-            bound if edges[name] is None else choose(bound, edges[name].value_rpm * np.pi / 30)
-            for name, bound, choose in (("lower", low, max), ("upper", high, min))
-        )
+        (low, high), lower, upper = self.wider, edges["lower"], edges["upper"]
+        low = low if lower is None else max(low, lower.value_rpm * np.pi / 30)
+        high = high if upper is None else min(high, upper.value_rpm * np.pi / 30)
         order = np.argsort(through.value)
         speeds, sizes = through.value[order], np.abs(through.multipliers[order]).max(axis=1)
         inside = (speeds > low * (1 + BESIDE)) & (speeds < high * (1 - BESIDE))
@@ -304,7 +323,7 @@ class OperatingRange:
             return none
         k = max(inner, key=lambda k: sizes[k])
         orbit = self._largest(through, place, "multiplier", speeds[k - 1], speeds[k + 1])
-        moves = orbit_slopes(self.designs, place, orbit)
+        moves = orbit_slopes(self.space, place, orbit)
         return Value(moves.multiplier, moves.multiplier_slope, float(orbit.speed) * 30 / np.pi)
 
     def worst(self, place: Float[np.ndarray, " n"], names: tuple[str, ...]) -> dict[str, Value] | str:
@@ -316,15 +335,15 @@ class OperatingRange:
         found = {}
         for name in names:
             orbit = self._worst_orbit(through, place, name)
-            moves = orbit_slopes(self.designs, place, orbit)
+            moves = orbit_slopes(self.space, place, orbit)
             value, slope = moves.multiplier, moves.multiplier_slope
             if name != "multiplier":
                 at, by = (jnp.asarray(place), orbit.speed, orbit.state), (orbit.method, jnp.asarray(_parts(orbit)))
-                value = float(_read(self.designs, *at, *by)[READ.index(name)])
-                moved = _read_moved(self.designs, *at, jnp.asarray(moves.state_slope), *by)
+                value = float(_read(self.space, *at, *by)[READ.index(name)])
+                moved = _read_moved(self.space, *at, jnp.asarray(moves.state_slope), *by)
                 slope = np.asarray(moved[READ.index(name)])
             if name == "film":
-                clearance = function_value(_clearance, self.designs, jnp.asarray(place))
+                clearance = function_value(_clearance, self.space, jnp.asarray(place))
                 value, slope = float(clearance[0]) - value, np.asarray(clearance[1]) - slope
             found[name] = Value(value, slope, float(orbit.speed) * 30 / np.pi)
         return found
@@ -369,7 +388,7 @@ class OperatingRange:
         self, place: np.ndarray, speed: float, state: Any, method: AbstractMethod, parts: int
     ) -> Float[np.ndarray, "3"]:
         at = jnp.asarray(place), jnp.asarray(speed, dtype=float), jnp.asarray(state)
-        return np.asarray(_read(self.designs, *at, method, jnp.asarray(parts)))
+        return np.asarray(_read(self.space, *at, method, jnp.asarray(parts)))
 
 
 READ = "land force", "drag", "film"

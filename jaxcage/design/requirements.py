@@ -11,8 +11,7 @@ from jaxtyping import Array, Float
 from .._errors import ArgumentError
 from .._parameters import parameter_info, parameters
 from ..models import AbstractForcedSystem
-from .objective import DesignSpace
-from .operating import OperatingRange, Value
+from .operating import DesignSpace, OperatingRange, Value
 
 
 @dataclasses.dataclass(frozen=True)

@@ -23,8 +23,7 @@ from ..lanes import sobol
 from ..models import AbstractForcedSystem
 from ..solve import AbstractMethod
 from .check import Checked, check_design
-from .objective import DesignSpace
-from .operating import OperatingRange, Value, function_value
+from .operating import DesignSpace, OperatingRange, Value, function_value
 from .requirements import Cost, Requirement, Requirements, balance_grade, cost_function, listed, values_at
 from .tolerance import Budget, Tolerance, budget_of, corner, widened
 from .unstable_width import UnstableWidth
@@ -150,11 +149,11 @@ class _CostProblem(_Problem):
         self.range, self.cost, self.notes = range_, cost, range_.handed_over
 
     def foreseen(self, trial: Trial, place: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = function_value(self.cost, self.range.designs, jnp.asarray(place))
+        value, slope = function_value(self.cost, self.range.space, jnp.asarray(place))
         return float(value), np.asarray(slope)
 
     def compute(self, place: np.ndarray) -> Trial:
-        value, slope = function_value(self.cost, self.range.designs, jnp.asarray(place))
+        value, slope = function_value(self.cost, self.range.space, jnp.asarray(place))
         before = len(self.notes)
         values = values_at(self.range, place, self.wanted)
         pairs = [] if isinstance(values, str) else [r.slack(values[r.of]) for r in self.wanted]

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from .._errors import ArgumentError
 from .._parameters import parameters
-from .objective import DesignSpace
+from .operating import DesignSpace
 
 
 class Tolerance(NamedTuple):

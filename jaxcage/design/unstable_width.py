@@ -8,8 +8,7 @@ from jaxtyping import Float
 from .._errors import InputError
 from ..orbits import Point, follow_all, loss_zones, synchronous_orbits
 from ..solve import AbstractMethod
-from .objective import DesignSpace
-from .operating import REACH, Value, point_of
+from .operating import REACH, DesignSpace, Value, point_of
 
 
 @dataclasses.dataclass

@@ -10,7 +10,7 @@ import optimistix as optx
 from jaxtyping import Array
 
 from .._parameters import parameter
-from .._types import Scalar
+from .._pytrees import Scalar
 from .elementary import power_10_9, smooth_plus
 from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion
 

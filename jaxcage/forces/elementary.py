@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from .._arguments import require_above_zero
-from .._types import Scalar
+from .._pytrees import Scalar
 
 
 QUARTER = (1.57079632673412561417, 6.07710050650619224932e-11)

@@ -23,7 +23,7 @@ from jaxtyping import Array
 
 from .._arguments import require_above_zero, require_at_least
 from .._parameters import choice, count, parameter
-from .._types import Scalar
+from .._pytrees import Scalar
 from .elementary import inverse_root, smooth_norm
 from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion
 

@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 
 from .._arguments import require_at_least
 from .._parameters import count, parameter
-from .._types import Scalar
+from .._pytrees import Scalar
 from ..bearing import load_distribution
 from .elementary import cos_sin, power_10_9
 from .law import AbstractForcing, AbstractLaw, Force, GuidedCage, Motion

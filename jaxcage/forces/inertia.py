@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from .._arguments import require_above_zero
-from .._types import Scalar
+from .._pytrees import Scalar
 from .elementary import cos_sin
 from .law import AbstractForcing, Force, Motion
 

@@ -10,15 +10,15 @@ from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import equinox as eqx
 
-from .._types import Scalar
+from .._pytrees import Scalar
 from .elementary import smooth_norm, smooth_plus
 
 
 Force = tuple[Scalar, Scalar, Scalar]
 """(F_x, F_y, moment) on the cage [N, N, N m], the moment about its centre and counter-clockwise.
 
-The speed of the cage is prescribed: moments do not change its motion. They are reported
-(`jaxcage.analysis.cage_moments`), and times the speed they are the power that drives the cage.
+The speed of the cage is prescribed: moments do not change its motion. Times the
+speed they are the power that drives the cage: that of the film is the power that its shear costs.
 """
 
 

@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from .._types import Scalar
+from .._pytrees import Scalar
 
 
 NODES = 16

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from .._parameters import parameter
-from .._types import Scalar
+from .._pytrees import Scalar
 
 
 def rib_force(

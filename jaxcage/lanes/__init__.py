@@ -10,11 +10,9 @@
 | `run`      | plan and settings to data set; sweeps over speed                                |
 | `dataset`  | the data set with units, words and provenance; zarr                             |
 | `ramps`    | run-up and run-down                                                             |
-| `spread`   | how a parameter is sampled                                                      |
 | `grid`     | grids and samples of parameters, cut into chunks                                |
 | `study`    | lanes over any parameters, stored as they go; maps of labels                    |
 | `store`    | the zarr folder of a study, whole at any time                                   |
-| `cluster`  | chunks of a study on dask.distributed                                           |
 """
 
 from .._arguments import check_layer
@@ -26,7 +24,15 @@ from .dataset import (
     stored_configuration as stored_configuration,
     versions as versions,
 )
-from .grid import OIL as OIL, Grid as Grid, sobol as sobol, with_values as with_values
+from .grid import (
+    OIL as OIL,
+    Between as Between,
+    Grid as Grid,
+    Spread as Spread,
+    Tolerance as Tolerance,
+    sobol as sobol,
+    with_values as with_values,
+)
 from .observe import Progress as Progress, start_tangents as start_tangents
 from .plan import Plan as Plan, Speeds as Speeds, States as States, initial_states as initial_states, rpm as rpm
 from .ramps import (
@@ -35,9 +41,8 @@ from .ramps import (
     ramp_up_down as ramp_up_down,
     stretches_apart as stretches_apart,
 )
-from .run import run_lanes as run_lanes, run_up_down as run_up_down, sweep as sweep
+from .run import run_lanes as run_lanes, sweep as sweep
 from .settings import Run as Run
-from .spread import Between as Between, Spread as Spread, Tolerance as Tolerance
 from .store import (
     DamagedStore as DamagedStore,
     OtherStudy as OtherStudy,
@@ -48,4 +53,4 @@ from .store import (
 from .study import Study as Study, label_map as label_map, run_study as run_study, study as study
 
 
-check_layer(globals(), "check_study label_map open_study run_up_down study sweep")
+check_layer(globals(), "check_study label_map open_study study sweep")

@@ -33,7 +33,7 @@ from ..models import AbstractForcedSystem
 from ..quantities import Quantity, averaged, quantity
 from ..solve import OUTCOMES, AbstractMethod
 from .confirm import Confirmation
-from .observe import Observation, over_lanes
+from .observe import Observation
 from .plan import SPEED, Plan
 from .settings import Run
 
@@ -104,7 +104,7 @@ def _averaged(found: Found) -> list[tuple[Quantity, np.ndarray, np.ndarray]]:
     model, seen, lanes = found.plan.model, found.seen, found.plan.lanes
     if not model.quantities:
         return []
-    numbers = over_lanes(lanes, np.arange(len(found.scale)), lambda model, speed: model.reference(speed))
+    numbers = lanes.each(type(model).reference, np.arange(len(found.scale)))
     given = model.beside, model.watched[1:], seen.integrals, seen.largest, numbers, float(found.run.block)
     return averaged(model.quantities, *given)
 

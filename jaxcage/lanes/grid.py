@@ -23,9 +23,7 @@ from .._parameters import pick
 from ..bearing import vg
 from ..models import AbstractForcedSystem
 from ..solve import Lanes
-from .observe import over_lanes
-from .plan import SPEED, START, Plan
-from .spread import Spread
+from .plan import SPEED, START, Plan, own_states
 
 
 SAMPLE = "sample"
@@ -43,6 +41,71 @@ def sobol(unknowns: int, draws: int, seed: int | np.random.Generator) -> Float[n
     from scipy.stats import qmc  # takes half a second to load
 
     return qmc.Sobol(unknowns, rng=seed).random_base2(math.ceil(math.log2(draws)))[:draws]
+
+
+SIGMAS = 3.0
+"""Standard deviations from the nominal value to either end of a tolerance, as in a capable production."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Between:
+    """Every value between two bounds is as likely as any other."""
+
+    lower: float
+    """[SI]."""
+    upper: float
+    """[SI]."""
+
+    def __post_init__(self):
+        if not (math.isfinite(self.lower) and math.isfinite(self.upper) and self.lower < self.upper):
+            raise ArgumentError(
+                "lower", "upper", said=f"must ascend, but {self.lower:g} and {self.upper:g} were given."
+            )
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Smallest and largest value [SI]."""
+        return self.lower, self.upper
+
+    def at(self, place: Float[np.ndarray, " samples"]) -> Float[np.ndarray, " samples"]:
+        """Values [SI] below which the shares `place` of all values lie."""
+        return self.lower + place * (self.upper - self.lower)
+
+
+@dataclasses.dataclass(frozen=True)
+class Tolerance:
+    """A nominal value and the deviation allowed to either side.
+
+    Values are normally distributed with a third of the deviation as their standard deviation, and what lies outside the
+    tolerance is sorted out.
+    """
+
+    value: float
+    """Nominal value [SI]."""
+    deviation: float
+    """Largest deviation [SI]."""
+
+    def __post_init__(self):
+        if not (math.isfinite(self.value) and math.isfinite(self.deviation) and self.deviation > 0):
+            raise ArgumentError(
+                "value",
+                "deviation",
+                said=f"must be a number and one above 0, but {self.value:g} and {self.deviation:g} were given.",
+            )
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Smallest and largest value [SI]."""
+        return self.value - self.deviation, self.value + self.deviation
+
+    def at(self, place: Float[np.ndarray, " samples"]) -> Float[np.ndarray, " samples"]:
+        """Values [SI] below which the shares `place` of all values lie."""
+        from scipy.stats import truncnorm  # takes half a second to load
+
+        return truncnorm.ppf(place, -SIGMAS, SIGMAS, loc=self.value, scale=self.deviation / SIGMAS)
+
+
+Spread = Between | Tolerance
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -167,7 +230,7 @@ class Grid:
             chosen = Lanes(designs, max(lanes.size, 2), np.arange(lanes.size), speed)
         else:
             chosen = Lanes.of([model], speed)
-        every = over_lanes(chosen, np.arange(lanes.size), _states)
+        every = chosen.each(own_states, np.arange(lanes.size))
         return Plan(chosen, every[np.arange(lanes.size), start], {"lane": lanes.size}, {SPEED: (("lane",), speed)})
 
     def laid_out(self, found: xr.Dataset) -> xr.Dataset:
@@ -195,11 +258,6 @@ def _summary(values: np.ndarray) -> list[Any]:
     """Count, ends and a digest of every bit."""
     exact = np.ascontiguousarray(values, dtype="<f8")
     return [exact.size, float(exact[0]), float(exact[-1]), hashlib.sha256(exact.tobytes()).hexdigest()[:16]]
-
-
-def _states(model: AbstractForcedSystem, speed: Any) -> Any:
-    row = lambda y: jnp.stack([jnp.asarray(c, dtype=float) for c in y])
-    return jnp.stack([row(y) for y in model.starts(speed)])
 
 
 def with_values(model: Any, values: Mapping[str, Any]) -> Any:

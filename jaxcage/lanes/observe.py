@@ -13,7 +13,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from .._form import Form, compiled
 from ..models import ESCAPE, AbstractForcedSystem
 from ..solve import (
     IMPLICIT,
@@ -30,6 +29,7 @@ from ..solve import (
     NativeSteps,
     codes_of,
     cores,
+    errors_of_parts,
 )
 from .settings import Run
 
@@ -235,9 +235,7 @@ class _Observer:
                 largest[alive, block] = ran.peaks[..., 1:].max(axis=1)
                 peak[alive] = np.fmax(peak[alive], ran.peaks[..., -1].max(axis=1))
                 recorded = ran.strobe[..., :dim] * scale[alive, None, :]
-                place[alive, block * strobes : (block + 1) * strobes] = over_lanes(
-                    self.lanes, some[alive], _centres, recorded
-                )
+                place[alive, block * strobes : (block + 1) * strobes] = self.lanes.each(_centres, some[alive], recorded)
                 continue
             strobe[alive] = ran.strobe[:, held - run.keep :]
             peak[alive] = np.maximum(ran.peak, begun)
@@ -284,13 +282,12 @@ class _Observer:
         It is at least the tolerance, which protects against accidental agreement of the two. The stretch is a
         revolution, or as much of one as two runs can be compared over.
         """
-        dim, numbers = self.model.dimension, self.lanes.numbers(engine, some)
-        turn = None
+        turn, numbers = None, self.lanes.numbers(engine, some)
         if self.averages:
             turn = np.array([self.model.comparable(speed) for speed in self.lanes.speed[some].tolist()])
-        once = lambda chosen: engine(numbers, state, 1, 1, chosen, turn=turn, threads=cores()).state[:, :dim]
-        apart = np.max(np.abs(once(method) - once(method.reference)), axis=1)
-        return np.maximum(SURE * np.nan_to_num(apart), getattr(method, "tolerance", 0.0))
+        ends = engine(numbers, state, 1, 1, method, turn=turn, threads=cores()).state
+        apart = errors_of_parts(engine, numbers, state, ends, self.model.dimension, method, turn=turn)
+        return np.maximum(np.nan_to_num(apart), getattr(method, "tolerance", 0.0))
 
     def _error_of_strobes(
         self,
@@ -305,33 +302,17 @@ class _Observer:
         if count < 1:
             return np.zeros(len(strobe))
         numbers = self.lanes.numbers(engine, np.repeat(some, count))
-        starts = pairs[:, :-1].reshape(-1, pairs.shape[2])
-        sharper = engine(numbers, starts, 1, 1, method.reference, threads=cores()).state
-        apart = np.max(np.abs(sharper - pairs[:, 1:].reshape(sharper.shape)), axis=1)
-        worst = SURE * np.max(np.nan_to_num(apart.reshape(-1, count)), axis=1)
+        begins, ends = (x.reshape(-1, pairs.shape[2]) for x in (pairs[:, :-1], pairs[:, 1:]))
+        apart = errors_of_parts(engine, numbers, begins, ends, pairs.shape[2], method)
+        worst = np.max(np.nan_to_num(apart.reshape(-1, count)), axis=1)
         return np.maximum(worst, getattr(method, "tolerance", 0.0))
-
-
-def over_lanes(lanes: Lanes, some: Int[np.ndarray, " some"], f: Callable[..., Any], *arrays: np.ndarray) -> Any:
-    """`f(model, speed, ...)` of some lanes, the arrays with the lanes first."""
-    rows = [jnp.asarray(x) for x in lanes.rows(some)]
-    given = [jnp.asarray(x) for x in (lanes.speed[some], *arrays)]
-    return jax.tree.map(np.asarray, _mapped(f, lanes.form, lanes.several, rows, *given))
-
-
-@compiled
-def _mapped(f: Callable[..., Any], form: Form, several: bool, rows: Any, speed: Array, *arrays: Array) -> Any:
-    def lane(row: Any, speed: Array, *arrays: Array) -> Any:
-        return jax.tree.map(lambda x: jnp.asarray(x, float), f(form.filled(row), speed, *arrays))
-
-    return jax.vmap(lane, in_axes=(0 if several else None, 0, *(0 for _ in arrays)))(rows, speed, *arrays)
 
 
 def centres_of(
     model: AbstractForcedSystem, speed: Float[np.ndarray, " n"], states: Float[np.ndarray, "n dim"]
 ) -> Float[np.ndarray, "n 2"]:
     """Centre of the cage from that of its land, over the clearance, at states of a model."""
-    return over_lanes(Lanes.of([model], speed), np.arange(speed.size), _centres, states[:, None])[:, 0]
+    return Lanes.of([model], speed).each(_centres, np.arange(speed.size), states[:, None])[:, 0]
 
 
 def _centres(model: Any, speed: Array, states: Array) -> Array:

@@ -6,14 +6,12 @@ import reprlib
 from collections.abc import Mapping, Sequence
 from typing import Any, overload
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from .._arguments import require_at_least, wrong
 from .._errors import ArgumentError
-from .._form import compiled
 from ..models import AbstractForcedSystem, require_speeds
 from ..solve import Lanes
 
@@ -129,7 +127,7 @@ def initial_states(
 ) -> Float[np.ndarray, "speeds states dim"]:
     """Initial states at each speed: the model's own, some of them, the same at every speed, or as given."""
     if states is None or isinstance(states, int):
-        own = np.asarray(_own_states(model, jnp.asarray(speed)))
+        own = Lanes.of([model], speed).each(own_states, np.arange(speed.size))
         if states is not None and not 1 <= states <= own.shape[1]:
             raise ArgumentError(
                 "starts", said=f"must be 1 to {own.shape[1]}, as many as the model has, but {states} was given."
@@ -148,7 +146,7 @@ def initial_states(
     return np.broadcast_to(np.stack(rows), (speed.size, len(rows), model.dimension)).copy()
 
 
-@compiled
-def _own_states(model: AbstractForcedSystem, speed: Float[Array, " speeds"]) -> Float[Array, "speeds states dim"]:
-    row = lambda y: jnp.stack([jnp.asarray(c) for c in y])
-    return jax.vmap(lambda s: jnp.stack([row(y) for y in model.starts(s)]))(speed)
+def own_states(model: AbstractForcedSystem, speed: Any) -> Float[Array, "states dim"]:
+    """Initial states that the model has at a speed."""
+    row = lambda y: jnp.stack([jnp.asarray(c, dtype=float) for c in y])
+    return jnp.stack([row(y) for y in model.starts(speed)])

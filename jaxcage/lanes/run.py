@@ -8,7 +8,6 @@ import xarray as xr
 from jaxtyping import Float
 
 from .._arguments import require_x64
-from .._types import State
 from ..analysis import label_lanes, motion_label
 from ..models import INSTEAD, AbstractForcedSystem, require_known
 from ..solve import OUTCOMES, AbstractMethod
@@ -124,40 +123,3 @@ def sweep(
         method=method,
     )
     return run_lanes(plan, run, progress)
-
-
-def run_up_down(
-    model: AbstractForcedSystem,
-    speeds: Speeds,
-    *,
-    start: State | None = None,
-    progress: Progress | None = None,
-    **settings: Any,
-) -> tuple[xr.Dataset, xr.Dataset]:
-    """Sweep up and down in speed, each speed begun in the final state of the one before, which shows hysteresis.
-
-    After a failure the next speed begins in the model's own initial state, so that one failure does not spoil the rest.
-
-    **Arguments:** model; ascending speeds [rad/s]; initial state, by default the model's first; called with speeds done
-    and speeds in all; fields of `jaxcage.lanes.Run`.
-
-    **Returns:** the sweep upwards and the sweep downwards, both at ascending speeds.
-    """
-    require_x64()
-    run = Run.of(model, **{"confirm": False, "horizon": 0, **settings})
-    up = Plan.over_speed(model, speeds, 1 if start is None else [start])
-    speed, state, seen = up.lanes.speed, None, []
-    for n in range(speed.size):  # one lane goes up, one comes down
-        place = np.array([n, speed.size - 1 - n])
-        fresh = up.states[place]
-        state = fresh if state is None else np.where(np.isfinite(state), state, fresh)
-        at = Plan(up.lanes.at(place), state, {"way": 2}, {"speed": (("way",), speed[place])})
-        seen.append(run_lanes(at, run))
-        state = seen[-1]["last"].values
-        if progress is not None:
-            progress(n + 1, speed.size)
-    rows = lambda way, order: [each.isel(way=way) for each in seen][::order]
-    joined = lambda way, order: xr.concat(rows(way, order), "speed", coords="different", compat="equals").expand_dims(
-        "start", 1
-    )
-    return joined(0, 1), joined(1, -1)

@@ -6,7 +6,7 @@ from typing import Any
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from ..analysis import LONGEST_PERIOD
-from ..models import AbstractForcedSystem, BearingModel
+from ..models import AbstractForcedSystem
 from ..solve import AbstractMethod, native
 
 
@@ -71,8 +71,6 @@ class Run:
             raise ArgumentError("settled", said=f"must be 0, or {allowed}, but is {self.settled}.")
         if self.settled and (self.confirm or self.horizon):
             raise ArgumentError("settled", said="goes with `confirm=False` and `horizon=0`, but one of them was given.")
-        if isinstance(model, BearingModel) and model.ring.ring_motion != "dynamic":
-            raise ArgumentError("model", said="must have a dynamic inner ring, but its `ring_motion` is quasi_static.")
         if model.samples > 1 and (self.confirm or self.horizon or self.settled):
             raise ArgumentError(
                 "confirm", "horizon", "settled", said="must be left out for a model whose revolutions do not repeat."

@@ -1,12 +1,11 @@
-"""Studies: lanes over any parameters, computed chunk by chunk into a store, in this process or on a cluster, from where
-an earlier run stopped."""
+"""Studies: lanes over any parameters, computed chunk by chunk into a store, from where an earlier run stopped."""
 
 import dataclasses
 import functools
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -20,12 +19,11 @@ from ..analysis import LONGEST_PERIOD, scatter
 from ..models import AbstractForcedSystem, require_speeds
 from ..quantities import quantity
 from .dataset import CODES, configuration_of, settings_of
-from .grid import LANES, Grid
+from .grid import LANES, Grid, Spread
 from .observe import Progress
 from .plan import SPEED
 from .run import run_lanes
 from .settings import Run
-from .spread import Spread
 from .store import Results, Store, Variable, open_study
 
 
@@ -50,26 +48,18 @@ class Study:
     model: AbstractForcedSystem
     grid: Grid
     run: Run
-    strobe: int = 0
-    """Strobe states stored of each lane, the last ones."""
     name: str = ""
     version: str = ""
     """Name and version of code of the user's own, which a store cannot recognise by itself."""
 
     def __post_init__(self):
         self.grid.require_known(self.model)
-        if not 0 <= self.strobe <= self.run.revolutions * (not self.model.beside):
-            raise ArgumentError(
-                "strobe",
-                said=f"must lie between 0 and the {self.run.revolutions} revolutions, and be 0 for a whole bearing, "
-                f"but is {self.strobe}.",
-            )
 
     @property
     def description(self) -> str:
         """All that a store is recognised by, as JSON."""
         run = {f.name: getattr(self.run, f.name) for f in dataclasses.fields(self.run) if f.name != "method"}
-        about = {"name": self.name, "version": self.version, "system": _described(self.model), "strobe": self.strobe}
+        about = {"name": self.name, "version": self.version, "system": _described(self.model)}
         method = {"method_numbers": numbers_of(self.run.method), **settings_of(self.run.method)}
         return json.dumps({**about, "plan": self.grid.describe(), **run, **method}, sort_keys=True)
 
@@ -84,19 +74,12 @@ class Study:
         for each in self.model.quantities:
             found[each.name] = Variable(each.text, each.unit)
             found[f"{each.name}_standard_error"] = Variable(f"standard error, {each.text}", each.unit)
-        if self.strobe:
-            found["strobe"] = Variable(*known("strobe"), within=("revolution", "component"))
         return found | {name: Variable(*known(name), kind="int8", names=words) for name, words in CODES.items()}
 
     @property
     def within(self) -> dict[str, np.ndarray]:
         """Axes within a lane, with their coordinates."""
-        last = self.run.discard + self.run.revolutions
-        found: dict[str, np.ndarray] = {"exponent": np.arange(1, self.run.exponents + 1)}
-        if self.strobe:
-            found["revolution"] = np.arange(last - self.strobe + 1, last + 1)
-            found["component"] = np.array(self.model.components, dtype=object)
-        return found
+        return {"exponent": np.arange(1, self.run.exponents + 1)}
 
     @property
     def own_code(self) -> str | None:
@@ -119,7 +102,7 @@ class Study:
             elif name.endswith("_standard_error"):
                 results[name] = scatter(found[f"{name.removesuffix('_standard_error')}_blocks"].values)
             else:
-                results[name] = found[name].values[:, -self.strobe :] if name == "strobe" else found[name].values
+                results[name] = found[name].values
             results[name] = results[name].astype(variable.kind)
         return results
 
@@ -132,12 +115,8 @@ def study(
     samples: int = 0,
     seed: int = 0,
     starts: int | None = None,
-    strobe: int = 0,
     lanes: int | None = None,
     shard: Shard = (1, 1),
-    executor: Literal["local", "dask"] = "local",
-    scheduler: str | None = None,
-    workers: int | None = None,
     progress: Progress | None = None,
     name: str = "",
     version: str = "",
@@ -156,11 +135,8 @@ def study(
     - `store`: the folder.
     - `samples`, `seed`: number of samples (a scrambled Sobol sequence; best a power of 2) and seed.
     - `starts`: how many of the model's own initial states are run at each point, by default all.
-    - `strobe`: strobe states stored of each lane, by default none.
     - `lanes`: lanes of a chunk, at most; by default 2048, or fewer where a lane takes long.
     - `shard`: (i, n) runs every n-th chunk from the i-th on. All shards write to the same folder.
-    - `executor`: `"local"` runs on all cores of this process, `"dask"` on a dask.distributed cluster.
-    - `scheduler`, `workers`: address of the scheduler of a cluster, by default one of its own with so many processes.
     - `progress`: called with lanes done and lanes in all, those that were stored before included.
     - `name`, `version`: of a function or class of your own that the model is made of. They must be given then, since a
         store cannot tell by itself whether your code is still the same: change the version whenever it changes.
@@ -168,17 +144,16 @@ def study(
 
     **Returns:** the store, opened by xarray: variables over the samples, the axes of the grid and `start`.
 
-    **Raises:** `ValueError` for arguments that do not fit together, and for a store of another study; `ImportError`
-    without dask.
+    **Raises:** `ValueError` for arguments that do not fit together, and for a store of another study.
     """
     require_x64()
     sampled: dict[str, Spread] = {each: how for each, how in vary.items() if isinstance(how, Spread)}
     axes = {each: np.asarray(x, dtype=float) for each, x in vary.items() if each not in sampled}
     own = len(model.starts(1.0)) if starts is None else starts
     most = lanes or (LANES if model.samples == 1 else LANES // 42)
-    run = Run.of(model, **{"keep": max(CLOSING, strobe), **settings, "confirm": False, "horizon": 0})
-    about = Study(model, Grid(axes, sampled, samples, seed, own, most), run, strobe, name, version)
-    run_study(about, store, shard, executor, scheduler, workers, progress)
+    run = Run.of(model, **{"keep": CLOSING, **settings, "confirm": False, "horizon": 0})
+    about = Study(model, Grid(axes, sampled, samples, seed, own, most), run, name, version)
+    run_study(about, store, shard, progress)
     return open_study(store)
 
 
@@ -186,19 +161,12 @@ def run_study(
     about: Study,
     path: str | Path,
     shard: Shard = (1, 1),
-    executor: str = "local",
-    scheduler: str | None = None,
-    workers: int | None = None,
     progress: Progress | None = None,
 ) -> None:
     """Compute what the store at `path` lacks; arguments as for `study`."""
     i, n = shard
     if not 1 <= i <= n:
         raise ArgumentError("shard", said=f"must be (i, n) with i from 1 to n, but ({i}, {n}) was given.")
-    if executor not in ("local", "dask"):
-        raise ArgumentError("executor", said=f"must be local or dask, but {executor!r} was given.")
-    if workers is not None:
-        require_at_least(1, workers=workers)
     store = Store(path, about)
     part = range(about.grid.chunks)[i - 1 :: n]
     mine, pending = set(part), store.pending(part)
@@ -206,20 +174,11 @@ def run_study(
     done, total = sum(size[c] for c in mine - set(pending)), sum(size.values())
     report = progress or (lambda done, total: None)
     report(done, total)
-    if executor == "dask":
-        from .cluster import chunks_on_dask  # needs an extra
-
-        computed = chunks_on_dask(about, pending, scheduler, workers)
-    else:
-        computed = ((chunk, about.chunk(chunk)) for chunk in pending)
-    for chunk, results in computed:
-        store.write(chunk, results)
+    for chunk in pending:
+        store.write(chunk, about.chunk(chunk))
         done += size[chunk]
         report(done, total)
-    left = set(store.pending())
-    if left & mine:
-        raise RuntimeError(f"{len(left & mine)} of {len(mine)} chunks did not come back.")
-    if not left:
+    if not store.pending():
         store.tidy()
 
 

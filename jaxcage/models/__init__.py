@@ -7,15 +7,45 @@
 | `cage`       | the cage in its rib: parameters, and forces at one speed                        |
 | `cases`      | the paper's six cases as models, constants that it does not print               |
 | `oscillator` | systems from a user's function, of first or second order                        |
-| `whole`      | the whole bearing: parameters, initial states, magnitudes, ready-made bearings  |
-| `whole_states` | its state, and the quantities beside it                                       |
-| `whole_field` | its equations of motion at one shaft speed                                     |
-| `whole_quantities` | quantities that it reports                                                |
+| `bearing_model` | the whole bearing: parameters, initial states, magnitudes, ready-made bearings |
+| `bearing_states` | its state, and the quantities beside it                                       |
+| `bearing_field` | its equations of motion at one shaft speed                                     |
+| `bearing_history` | forces on every roller along a time history                                  |
+| `bearing_quantities` | quantities that it reports                                                |
 | `contacts`   | its contacts: raceways, pockets, guiding land, oil                              |
 | `cage_quantities` | quantities that a cage reports of a time history                           |
 """
 
 from .._arguments import check_layer
+from .bearing_field import MOVING as MOVING, BearingAtSpeed as BearingAtSpeed, Passed as Passed
+from .bearing_history import RollerHistory as RollerHistory
+from .bearing_model import (
+    CAGE_STARTS as CAGE_STARTS,
+    WHOLE_BEARINGS as WHOLE_BEARINGS,
+    BearingModel as BearingModel,
+    CagePlace as CagePlace,
+    InnerRing as InnerRing,
+    Wear as Wear,
+    drawn_places as drawn_places,
+    rolling_start as rolling_start,
+    state_scale as state_scale,
+    whole_bearing as whole_bearing,
+)
+from .bearing_states import (
+    BESIDE as BESIDE,
+    INTEGRATED as INTEGRATED,
+    LEDGER as LEDGER,
+    MEANS as MEANS,
+    OF_BODIES as OF_BODIES,
+    OF_ROLLER as OF_ROLLER,
+    WATCHED as WATCHED,
+    BearingState as BearingState,
+    Bodies as Bodies,
+    Rates as Rates,
+    Rollers as Rollers,
+    bodies_of as bodies_of,
+    rollers_of as rollers_of,
+)
 from .cage import (
     FASTEST as FASTEST,
     FORCES as FORCES,
@@ -49,36 +79,6 @@ from .protocol import (
     AbstractForcedSystem as AbstractForcedSystem,
     require_known as require_known,
     require_speeds as require_speeds,
-)
-from .whole import (
-    CAGE_STARTS as CAGE_STARTS,
-    WHOLE_BEARINGS as WHOLE_BEARINGS,
-    BearingModel as BearingModel,
-    BearingOverTime as BearingOverTime,
-    CagePlace as CagePlace,
-    InnerRing as InnerRing,
-    Wear as Wear,
-    drawn_places as drawn_places,
-    rolling_start as rolling_start,
-    slowness as slowness,
-    state_scale as state_scale,
-    whole_bearing as whole_bearing,
-)
-from .whole_field import MOVING as MOVING, BearingAtSpeed as BearingAtSpeed, Passed as Passed
-from .whole_states import (
-    BESIDE as BESIDE,
-    INTEGRATED as INTEGRATED,
-    LEDGER as LEDGER,
-    MEANS as MEANS,
-    OF_BODIES as OF_BODIES,
-    OF_ROLLER as OF_ROLLER,
-    WATCHED as WATCHED,
-    BearingState as BearingState,
-    Bodies as Bodies,
-    Rates as Rates,
-    Rollers as Rollers,
-    bodies_of as bodies_of,
-    rollers_of as rollers_of,
 )
 
 

@@ -14,7 +14,7 @@ from jaxtyping import Array
 from .._arguments import is_concrete
 from .._errors import ArgumentError
 from .._parameters import parameter, printed, reading, require_readings, with_numbers
-from .._types import Scalar, State
+from .._pytrees import Scalar, State
 from ..bearing import Bearing, Lubricant
 from ..forces import (
     LAWS,

@@ -22,7 +22,7 @@ from jaxtyping import Array, Float
 from .._arguments import is_concrete
 from .._errors import ArgumentError
 from .._parameters import choice, parameter
-from .._types import Scalar
+from .._pytrees import Scalar
 from ..forces import (
     ContactForce,
     FilmForce,

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from .._types import Scalar, State
+from .._pytrees import Scalar, State
 
 
 Matrix = tuple[tuple[Array, ...], ...]

@@ -13,7 +13,7 @@ from jaxtyping import Array
 
 from .._arguments import checked, require_at_least, shown
 from .._errors import ArgumentError, InputError
-from .._types import Scalar, State
+from .._pytrees import Scalar, State
 from .field import AbstractField, FirstOrderField, SecondOrderField
 from .protocol import AbstractForcedSystem, told
 

@@ -8,7 +8,7 @@ import abc
 import contextlib
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -16,7 +16,7 @@ import numpy as np
 
 from .._arguments import is_concrete
 from .._errors import ArgumentError, InputError
-from .._types import Scalar, State
+from .._pytrees import Scalar, State
 from ..quantities import Quantity
 from .field import AbstractField
 
@@ -25,6 +25,20 @@ ESCAPE = 2.0
 """Excursion beyond which a trajectory has left the model for good."""
 HIGHEST = 1e9
 """Highest speed of any system [rad/s]."""
+
+
+class StepLimits(NamedTuple):
+    """Limits of the steps of machine code, for tolerances from 1e-6 on; smaller ones take more steps."""
+
+    first: float
+    """Step that is tried first [rad]."""
+    longest: float
+    """[rad]."""
+    shortest: float
+    """Step below which a lane is given up [rad]."""
+    most: float
+    """Largest number of steps from strobe state to strobe state, or in a sixteenth of a revolution if that is less;
+    times `slowness`."""
 
 
 class AbstractForcedSystem(eqx.Module):
@@ -57,6 +71,8 @@ class AbstractForcedSystem(eqx.Module):
     """Settings of a run (`jaxcage.lanes.Run`) that suit the model better than the general ones."""
     speed_text: ClassVar[str] = "speed"
     """Words for the model's speed."""
+    steps: ClassVar[StepLimits] = StepLimits(0.05, math.pi / 2, 1e-10, 20_000.0)
+    """Limits of the steps; the period of the forcing's highest harmonic has two at least."""
     quantities: ClassVar[tuple[Quantity, ...]] = ()
     """Quantities that the model reports of a run, which follow from `beside` and `watched`."""
 
@@ -89,6 +105,14 @@ class AbstractForcedSystem(eqx.Module):
         """Phase [rad] over which a run is compared with a more exact one: its error is stated for such a stretch."""
         return 2 * math.pi
 
+    def slowness(self, speed: Scalar) -> Scalar:
+        """Factor of the most steps that a lane may take: 1, or more at speeds at which a revolution takes long."""
+        return 1.0
+
+    def first_state(self, start: Any) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers of an initial state, and those of the quantities beside it at the beginning of a run."""
+        return np.array(start, dtype=float), np.array(self.beside_start, dtype=float)
+
     def turning_speed(self, speed: Scalar) -> Scalar:
         """Speed at which the phase advances, in the mean [rad/s]; the model's own unless its revolutions are others."""
         return speed
@@ -100,6 +124,15 @@ class AbstractForcedSystem(eqx.Module):
     def centre(self, y: Any) -> tuple[Scalar, Scalar]:
         """Centre of the cage from that of its land, over the clearance, in models that have one."""
         raise NotImplementedError
+
+    def roller_history(self, run: Any) -> Any:
+        """Forces, loads and slips of every roller at the samples of a time history (`RollerHistory`), in models that
+        have rollers."""
+        raise NotImplementedError
+
+    def known_orders(self, run: Any) -> dict[str, float]:
+        """Frequencies that a bearing is known by, over that of the phase: means over a time history."""
+        return {}
 
     def reference(self, speed: Scalar) -> dict[str, Scalar]:
         """Numbers by name that the quantities refer to, such as the cage speed in pure rolling."""

@@ -10,8 +10,7 @@ from jaxtyping import Array, Float, Int
 
 from .._arguments import require_at_least, require_x64, shown, wrong
 from .._errors import ArgumentError
-from .._form import compiled
-from .._types import Scalar
+from .._pytrees import Scalar, compiled
 from ..models import AbstractForcedSystem, require_speeds
 from ..solve import AbstractMethod
 from .branch import follow_both_ways

@@ -11,10 +11,10 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
-from .._notebook import notebook_html
-from .._types import Scalar
+from .._pytrees import Scalar
 from ..analysis import Edge
 from ..models import AbstractForcedSystem, require_speeds
+from ..quantities import notebook_html
 from ..solve import AbstractMethod, Rodas4
 from .continuation import (
     ONCE,

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._errors import ArgumentError
-from .._form import compiled
+from .._pytrees import compiled
 from ..solve import AbstractMethod, cores
 from .newton import TOLERANCE, AbstractEquations, solve
 from .orbit import OrbitEquations

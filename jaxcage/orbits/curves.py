@@ -11,8 +11,8 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from .._arguments import require_x64
 from .._errors import ArgumentError
-from .._notebook import notebook_html
 from ..models import AbstractForcedSystem
+from ..quantities import notebook_html
 from ..solve import AbstractMethod
 from .bifurcation import PointEquations
 from .continuation import Continuation, ContinuationProblem, Path, first_points, in_parallel

@@ -22,10 +22,10 @@ from jaxtyping import Array, Complex, Float
 
 from .._arguments import require_x64
 from .._errors import ArgumentError
-from .._form import compiled
-from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
+from .._pytrees import compiled
 from ..models import AbstractForcedSystem
+from ..quantities import notebook_html
 from ..solve import AbstractMethod
 from .bifurcation import TANGENTIAL, PointEquations, critical_rate
 from .branch import FEIGENBAUM, Cascade
@@ -328,13 +328,13 @@ def orbit_slopes(
     **Arguments:** the system as a function of design variables, a module; the values of these at which `orbit` was
     found. If two multipliers are equal in size, one of them is taken.
     """
-    at = jnp.asarray(at, dtype=float)
-    given = Given(designs(at), jnp.asarray(orbit.speed, dtype=float))
+    place = jnp.asarray(at, dtype=float)
+    given = Given(designs(place), jnp.asarray(orbit.speed, dtype=float))
     problem = make_problem(given, (), jnp.ones(0), orbit.periods, orbit.method)
     equations, u = OrbitEquations(problem), orbit.state / problem.scale
     numbers = numbers_around(equations, u, given)
     (_, monodromy), slopes = around_root(equations, u, numbers, *expansion(problem, u, numbers))
-    by_design = _numbers_by(problem, u, given.speed, designs, at)
+    by_design = _numbers_by(problem, u, given.speed, designs, place)
     size, multiplier, unknowns = _orbit_moves(monodromy, *slopes, by_design)
     state = np.asarray(problem.scale)[:, None] * np.asarray(unknowns)
     return OrbitSlopes(float(size), np.asarray(multiplier), state)

@@ -25,8 +25,7 @@ from jax.core import Tracer
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
-from .._form import compiled
-from .._types import Scalar
+from .._pytrees import Scalar, compiled
 from ..solve import StrobeMap
 from .problem import OrbitProblem, Prepared, frozen
 from .step_counts import GIVEN_UP, Counts, by_steps

@@ -12,10 +12,9 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._arguments import require_at_least, require_x64, shown
 from .._errors import ArgumentError
-from .._form import compiled
-from .._notebook import notebook_html
-from .._types import Scalar, State
+from .._pytrees import Scalar, State, compiled
 from ..models import AbstractForcedSystem, require_speeds
+from ..quantities import notebook_html
 from ..solve import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, strobe_map
 from .newton import AbstractEquations, as_root, refined
 from .problem import Given, OrbitProblem, Prepared, frozen, is_traced, make_problem

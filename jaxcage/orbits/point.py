@@ -18,10 +18,10 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._errors import ArgumentError
-from .._notebook import notebook_html
-from .._types import Scalar
+from .._pytrees import Scalar
 from ..analysis import Edge
 from ..models import AbstractForcedSystem
+from ..quantities import notebook_html
 from .problem import SPEED, Parameter, value_of
 
 

@@ -18,7 +18,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
 from .._parameters import Parameter as Parameter, pick as pick
-from .._types import Scalar
+from .._pytrees import Scalar
 from ..models import AbstractForcedSystem
 from ..solve import AbstractMethod, StrobeMap, pushed, strobe_map
 

@@ -1,4 +1,4 @@
-"""Search for orbits without a hint: synchronous (period-1) orbits over a range of speed, coexisting ones at one speed.
+"""Search for synchronous (period-1) orbits over a range of speed, without a hint of where they are.
 
 Newton's method leads to stable orbits from the ends of simulations on a coarse grid of speeds. Each orbit is followed
 both ways, until every orbit that was met lies on a known branch. Stable stretches of the branches are bounded by
@@ -15,9 +15,9 @@ import numpy as np
 import xarray as xr
 
 from .._arguments import require_at_least
-from .._notebook import notebook_html
 from ..lanes import initial_states, sweep
 from ..models import AbstractForcedSystem
+from ..quantities import notebook_html
 from ..solve import AbstractMethod
 from .branch import Branch, follow_both_ways
 from .continuation import ContinuationProblem, orbit_curves
@@ -32,8 +32,6 @@ TRIES = 3  # branches followed where one stable range is wanted
 PATIENCE_OUT = 3  # the same where only the stable orbits on both sides are wanted
 OUTWARD = StepControl(first=0.05, longest=0.5, most=400)  # steps along the orbits of a stable range
 ON_BRANCH = 0.03  # largest distance of an orbit on a branch from the branch, in units of the system's scale
-SPREAD = 0.6  # random initial states are spread over this share of the system's scale in every direction
-SAME = 1e-4  # largest distance of equal orbits: one that hardly attracts moves by a hundred times its map's error
 NEARLY = 0.1  # a simulation that moves by less in its last revolution, in units of the scale, approaches an orbit
 Progress = Callable[[str, int, int], None]
 Scale = Callable[[float], np.ndarray]

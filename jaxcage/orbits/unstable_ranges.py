@@ -17,9 +17,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._notebook import notebook_html
 from ..analysis import Zone, Zones, closing_width
 from ..models import AbstractForcedSystem
+from ..quantities import notebook_html
 from ..solve import AbstractMethod
 from .branch import Cascade, cascade
 from .point import Point

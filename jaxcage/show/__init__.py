@@ -38,7 +38,6 @@ from .columns import (
 )
 from .design_figures import (
     chance_of_chaos as chance_of_chaos,
-    design_figure as design_figure,
     elasticity_bars as elasticity_bars,
     optimum_figure as optimum_figure,
     statistic_bars as statistic_bars,
@@ -47,7 +46,6 @@ from .design_tables import (
     before_and_after_table as before_and_after_table,
     budget_table as budget_table,
     changed_table as changed_table,
-    optima_table as optima_table,
     sobol_table as sobol_table,
 )
 from .diagrams import (

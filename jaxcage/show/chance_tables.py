@@ -30,7 +30,7 @@ def chances_document(found: Ensemble) -> dict[str, Any]:
 
 
 def chances_tables(name: str, found: Ensemble, beside: Beside = None) -> list[Table]:
-    """Stretches of speed with one verdict, bands of the edges, and the unknown values, the most telling first."""
+    """Stretches of speed with one verdict, and the unknown values, the most telling first."""
     (low, high), verdicts, lost = found.interval, found.verdict, len(found.place) - found.counts[1]
     span = lambda x, unit="": " to ".join(dict.fromkeys(f"{end:.0f}" for end in (np.min(x), np.max(x)))) + unit
     stretches = []
@@ -44,16 +44,12 @@ def chances_tables(name: str, found: Ensemble, beside: Beside = None) -> list[Ta
     columns += [Column(head, ()) for head in ("verdict", "chance", "95 % bars", "failed draws")]
     draws = f"{found.place.shape[0]} draws from {len(found.unknowns)} ranges"
     chances = rows_table(f"Chance of chaos of {name}, {draws} [rpm]", stretches, columns)
-    levels = ("5 %", "middle", "95 %")
-    bands = [{"edge": b.name, "share": b.share, **dict(zip(levels, b.rpm, strict=True))} for b in found.bands]
-    ends = [column for head in levels for column in speed_columns(head, head, beside)]
-    share = Column("draws that have it", (), "1", "%", key="share", digits=0)
-    edges = rows_table(f"Chaotic edges of {name} [rpm]", bands, [Column("edge", ()), *ends, share], "bands")
-    return [chances, edges, _unknowns_table(found)]
+    return [chances, unknowns_table(found, found.clues())]
 
 
-def _unknowns_table(found: Ensemble) -> Table:
-    shares = {c.label: c.share for c in found.clues()}
+def unknowns_table(found: Ensemble, clues: Sequence[Clue]) -> Table:
+    """Ranges, how to measure each value, and its share of the verdict, the largest first."""
+    shares = {c.label: c.share for c in clues}
     each = zip(found.unknowns, found.units or len(found.unknowns) * ("",), found.sources, strict=True)
     rows = [
         {"value": u.label, "range": range_words(u.range, unit), "share": shares.get(u.label), "measure": source}

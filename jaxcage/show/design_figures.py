@@ -5,14 +5,13 @@ from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .._errors import ArgumentError
 from ..orbits import Sensitivity
-from .diagrams import draw_beside, label_speed
+from .diagrams import label_speed
 from .style import (
     BAND,
     BLACK,
@@ -33,7 +32,7 @@ from .style import (
 
 
 if TYPE_CHECKING:
-    from ..design import BeforeAfter, MeanGradient, Optimised
+    from ..design import BeforeAfter, MeanGradient, Optimum
 
 
 FIRST = ("guidance_gap", "eccentricity")
@@ -125,39 +124,14 @@ def _bars_with_errors(ax: Axes, values: np.ndarray, errors: np.ndarray, colours:
     ax.errorbar(values, place, xerr=2 * errors, fmt="none", ecolor=BLACK, elinewidth=1.1)
 
 
-def design_history(found: "Optimised", ax: Axes | None = None) -> Axes:
-    """Objective over the steps of each search, the best one in colour."""
-    ax = axes_or_new(ax, height=2.5)
-    for i, optimum in reversed(list(enumerate(found.optima))):
-        value = np.array([s.value if s.status == "ok" else np.nan for s in optimum.history])
-        if i:
-            ax.plot(value, color=GREY, linewidth=0.9)
-            continue
-        ax.plot(value, color=BLUE, linewidth=1.4, label="best")
-        best = int(np.nanargmin(value))
-        ax.plot(best, value[best], "o", color=VERMILION, markersize=5, label="chosen")
-    ax.set(xlabel="Step", ylabel="Objective [rpm]")
-    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0, frameon=False)
-    return ax
-
-
-def design_figure(found: "Optimised", before: xr.Dataset, after: xr.Dataset) -> Figure:
-    """The search above; orbit diagrams and exponents of the first design and the chosen one below, on one scale."""
-    figure = new_figure(12.0, 8.0)
-    grid = figure.add_gridspec(3, 2, height_ratios=(1.0, 1.6, 1.0))
-    design_history(found, figure.add_subplot(grid[0, :]))
-    cells = grid[1:, :].subgridspec(2, 2, height_ratios=(1.6, 1.0)).subplots(sharex="col")
-    draw_beside(np.asarray(cells), ("before", "after"), (before, after))
-    return figure
-
-
-def optimum_figure(found: "Optimised", rows: Sequence["BeforeAfter"], title: str = "") -> Figure:
+def optimum_figure(found: "Optimum", rows: Sequence["BeforeAfter"], title: str = "") -> Figure:
     """The search beside the relative change of every statistic that is not 0, with bars of two standard errors; changes
     within them are grey."""
     shown = [row for row in rows if row.before]
     figure = new_figure(11.0, 1.6 + 0.34 * len(shown))
     left, right = figure.subplots(1, 2)
-    design_history(found, left).set_ylabel("Objective over that of the design before")
+    dress(left).plot(np.arange(1, len(found.history) + 1), np.minimum.accumulate(found.history), "o-", color=BLUE)
+    left.set(xlabel="Step", ylabel="Best objective so far")
     change, error = (100 * np.array([getattr(r, n) / r.before for r in shown]) for n in ("change", "change_error"))
     _bars_with_errors(dress(right), change, error, [BLUE if row.known else GREY for row in shown])
     unit = lambda row: row.unit.replace("^", "").replace("/", "_per_").replace(" ", "_")
@@ -170,14 +144,12 @@ def chance_of_chaos(
     rpm: Float[np.ndarray, " speeds"],
     chance: Float[np.ndarray, " speeds"],
     interval: tuple[Float[np.ndarray, " speeds"], Float[np.ndarray, " speeds"]],
-    bands: Sequence[tuple[str, tuple[float, float, float]]] = (),
     ax: Axes | None = None,
 ) -> Axes:
     """Chance of chaos at each speed with its 95 % bar, blue where calm, red where chaotic, purple where it is not
-    decided; quantiles of the edges beneath the zero line.
+    decided.
 
-    **Arguments:** speeds of the cage [rpm]; chances; lower and upper bounds; names of edges with their 5 %, 50 % and
-    95 % quantiles [rpm]; axes.
+    **Arguments:** speeds of the cage [rpm]; chances; lower and upper bounds; axes.
     """
     ax = axes_or_new(ax, 9.0, 4.2)
     groups = {
@@ -192,15 +164,8 @@ def chance_of_chaos(
             ax.errorbar(rpm[which], chance[which], yerr=bars[:, which], **style)
     for level in (SURE, 1 - SURE):
         ax.axhline(level, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)))
-    for i, (name, (low, middle, high)) in enumerate(bands):
-        y = -0.09 - 0.08 * i
-        ax.plot([low, high], [y, y], color=GREY, linewidth=4, solid_capstyle="butt", alpha=0.6)
-        ax.plot([middle], [y], "|", color="#000000", markersize=7)
-        left = high > rpm[0] + 0.8 * (rpm[-1] - rpm[0])  # the name goes where it stays inside
-        style = {"textcoords": "offset points", "ha": "right" if left else "left", "va": "center", "fontsize": 8}
-        ax.annotate(name, (low if left else high, y), (-4 if left else 4, 0), **style)
     pad = 0.01 * (rpm[-1] - rpm[0]) or 50.0
-    ax.set(ylim=(-0.05 - 0.09 * len(bands), 1.05), xlim=(rpm[0] - pad, rpm[-1] + pad), ylabel="Chance of chaos")
+    ax.set(ylim=(-0.05, 1.05), xlim=(rpm[0] - pad, rpm[-1] + pad), ylabel="Chance of chaos")
     ax.set_yticks(np.linspace(0, 1, 6))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, frameon=False, fontsize=8.5)
     return label_speed(ax)

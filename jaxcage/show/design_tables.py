@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .._parameters import parameter_info, parameters
-from ..design import BeforeAfter, Optimised, SobolIndices, ToleranceBudget
+from ..design import BeforeAfter, Optimum, SobolIndices, ToleranceBudget
 from .tables import SHOWN, Column, Table, rows_table
 
 
@@ -13,26 +13,15 @@ MOST = 8
 """Parameters listed in a budget."""
 
 
-def changed_table(title: str, model: Any, found: Optimised, vary: Mapping[str, tuple[float, float]]) -> Table:
+def changed_table(title: str, model: Any, found: Optimum, vary: Mapping[str, tuple[float, float]]) -> Table:
     """Parameters that were varied, before and after."""
     info, before, rows = parameter_info(model), parameters(model), []
-    for name, value in found.best.values.items():
+    for name, value in found.values.items():
         unit = info[name].unit
         numbers = Column("", [float(x) for x in (before[name], value, *vary[name])], unit).cells
         row = {"parameter": name.replace("_", " "), "unit": SHOWN.get(unit, unit), "bounds": " to ".join(numbers[2:])}
         rows.append(row | {"before": numbers[0], "after": numbers[1]})
     return rows_table(title, rows, [Column(head, ()) for head in ("parameter", "unit", "before", "after", "bounds")])
-
-
-def optima_table(model: Any, found: Optimised) -> Table:
-    """The distinct optima, the best first."""
-    info, rows = parameter_info(model), []
-    for best, starts in found.distinct:
-        bound = ", ".join(best.at_bound) or "none"
-        rows.append({**best.values, "objective": best.objective, "starts": starts, "bound": bound})
-    columns = [Column(n.replace("_", " "), (), info[n].unit, key=n) for n in found.best.values]
-    rest = [Column("objective", ()), Column("starts", ()), Column("at a bound", (), key="bound")]
-    return rows_table("Optima", rows, [*columns, *rest], "optima")
 
 
 def before_and_after_table(title: str, rows: Sequence[BeforeAfter]) -> Table:

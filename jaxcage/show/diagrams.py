@@ -316,14 +316,6 @@ def sweeps_beside(names: Sequence[str], sweeps: Sequence[xr.Dataset], zones: Seq
         return quantities_beside(names, sweeps, [*reported(sweeps[0], COMPARED), "exponent"])
     figure = style.new_figure(12.0, 6.4)
     cells = figure.subplots(2, len(sweeps), sharex="col", sharey="row", squeeze=False, height_ratios=(2.0, 1.0))
-    draw_beside(cells, names, sweeps, zones)
-    return figure
-
-
-def draw_beside(
-    cells: np.ndarray, names: Sequence[str], sweeps: Sequence[xr.Dataset], zones: Sequence[Zones] | None = None
-) -> None:
-    """Draw the orbit diagram and the exponents of each design in a column of two axes, with one legend."""
     limits = []
     for column, (name, sweep) in enumerate(zip(names, sweeps, strict=True)):
         above, below = cells[:, column]
@@ -336,13 +328,13 @@ def draw_beside(
                 shade_zones(ax, zones[column])
             if column:
                 ax.set_ylabel("")
-    figure = cells[0, 0].figure
     for row, ends in zip(cells, zip(*limits, strict=True), strict=True):
         for ax in row:
             ax.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
     for ax, sweep in zip(cells[1], sweeps, strict=True):
         add_shaft_axes(figure, sweep, [ax])
     style.legend_below(figure, *cells.ravel())
+    return figure
 
 
 def _lines(ax: Axes, name: str, sweeps: dict[str, xr.Dataset]) -> Axes:

@@ -272,12 +272,8 @@ def _known(findings: Findings, chances: Ensemble) -> Section:
     tables = chances_tables(findings.name, chances, other)
     if findings.operating and other is not None:
         tables = [operating_chances(chances, findings.operating, 1 / other[1]), *tables]
-    bands = [(b.name, b.rpm) for b in chances.bands]
-    figure = drawn(lambda ax: chance_of_chaos(chances.rpm, chances.chance, chances.interval, bands, ax), 9.5, 4.6)
-    caption = (
-        f"Share of {chances.place.shape[0]} draws from the ranges that are chaotic, with 95 % bars; beneath, where the "
-        "edges lie in 90 % of the draws that have them."
-    )
+    figure = drawn(lambda ax: chance_of_chaos(chances.rpm, chances.chance, chances.interval, ax), 9.5, 4.6)
+    caption = f"Share of {chances.place.shape[0]} draws from the ranges that are chaotic, with 95 % bars."
     figures, notes = {"chance": (_marked(figure, findings), caption)}, chances_notes(chances)
     return Section("known", "What is known, and what it decides", notes, figures, tables)
 

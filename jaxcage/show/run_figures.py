@@ -17,10 +17,8 @@ from ..analysis import (
     OrderSpectrum,
     RollerHistory,
     around,
-    bearing_orders,
     bearing_spectra,
     cage_forces,
-    roller_history,
 )
 from ..bearing import LoadDistribution
 from ..quantities import component_names, quantity
@@ -51,9 +49,9 @@ def rollers_of(model: Any, run: Trajectory) -> Rollers | None:
     """The rollers of a run; None for a model without rollers."""
     if model.samples == 1:
         return None
-    history = roller_history(model, run)
+    history = model.roller_history(run)
     several = len(history.time) >= 2 * history.samples
-    return Rollers(history, around(history), bearing_spectra(history) if several else {}, bearing_orders(model, run))
+    return Rollers(history, around(history), bearing_spectra(history) if several else {}, model.known_orders(run))
 
 
 def time_history(trajectory: Trajectory, ax: Axes | None = None) -> Axes:

@@ -12,11 +12,11 @@
 | `engine`      | the engine of a model; lanes, each a design at a speed; histories                       |
 | `jax_engine`  | the engine inside JAX, for methods and laws without machine code                        |
 | `method`      | methods by name: machine code, a fixed number of steps, or adaptive steps               |
-| `solvers`     | diffrax solvers of our own: Rosenbrock, Newmark, classical Runge-Kutta                  |
+| `solvers`     | diffrax solvers of our own: Rosenbrock, classical Runge-Kutta                           |
 | `kernel`      | a step of a method as a scalar function                                                 |
-| `call`        | machine code that JAX's programs call                                                   |
-| `steps`       | equal steps inside JAX's programs: lanes, tangents, derivatives of any order            |
-| `revolution`  | the strobe map, differentiable; tangents along which the field changes too              |
+| `xla_call`    | machine code that JAX's programs call                                                   |
+| `march`       | equal steps inside JAX's programs: lanes, tangents, derivatives of any order            |
+| `strobe_map`  | the strobe map, differentiable; tangents along which the field changes too              |
 | `simulate`    | time histories, speed ramps                                                             |
 | `outcomes`    | results of a run, and how it ended                                                      |
 """
@@ -30,6 +30,7 @@ from .engine import (
     alike as alike,
     cores as cores,
     engine_of as engine_of,
+    errors_of_parts as errors_of_parts,
     histories as histories,
 )
 from .ir import UnknownOperation as UnknownOperation, say_once as say_once
@@ -44,6 +45,7 @@ from .loop import (
     STUCK as STUCK,
     TOO_MANY as TOO_MANY,
 )
+from .march import march as march, march_with_tangents as march_with_tangents, with_tangents as with_tangents
 from .method import (
     DEFAULT_ERROR as DEFAULT_ERROR,
     IMPLICIT as IMPLICIT,
@@ -63,25 +65,20 @@ from .outcomes import (
     codes_of as codes_of,
     outcome_code as outcome_code,
 )
-from .revolution import StrobeMap as StrobeMap, pushed as pushed, strobe_map as strobe_map
 from .simulate import (
     Trajectory as Trajectory,
-    bearing_over_time as bearing_over_time,
     ramp as ramp,
     simulate as simulate,
 )
 from .solvers import (
     ClassicalRK4 as ClassicalRK4,
-    NewmarkBeta as NewmarkBeta,
-    Rodas3 as Rodas3,
     Rodas4 as Rodas4,
-    RosenbrockTableau as RosenbrockTableau,
     rosenbrock_step as rosenbrock_step,
 )
-from .steps import march as march, march_with_tangents as march_with_tangents, with_tangents as with_tangents
+from .strobe_map import StrobeMap as StrobeMap, pushed as pushed, strobe_map as strobe_map
 
 
 check_layer(
     globals(),
-    "bearing_over_time method native ramp simulate strobe_map",
+    "method native ramp simulate strobe_map",
 )

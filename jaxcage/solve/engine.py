@@ -16,15 +16,15 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Array, Float, Int
 
 from .._errors import ArgumentError
-from .._form import split
-from ..models import AbstractForcedSystem, BearingModel, slowness
-from .fields import SAMPLED, Numbers, room_for, traced_field
+from .._pytrees import Form, compiled, split
+from ..models import AbstractForcedSystem
+from .fields import SAMPLED, LaneNumbers, Numbers, room_for, traced_field
 from .ir import UnknownOperation, say_once
 from .jax_engine import JaxEngine
-from .layout import REVOLUTION, Field, Layout, Tableau, layout_of
+from .layout import REVOLUTION, Tableau, layout_of
 from .loop import march_ir
 from .method import IMPLICIT, AbstractMethod, NativeSteps
 from .object_code import function
@@ -33,19 +33,8 @@ from .outcomes import March
 
 WIDTH = 8
 """Lanes of a vector."""
-FIRST_STEP = 0.05
-"""Step that is tried first [rad]."""
-FEWEST_STEPS, MOST_STEPS, MOST_AT = 4, 20_000.0, 1e-6
-"""Limits of the number of steps from strobe to strobe; the period of the forcing's highest harmonic has two at least.
-The second is for tolerances from the third on; smaller ones take more steps."""
-SMALLEST_STEP = 1e-10
-"""Step below which a lane is given up [rad]."""
-BEARING_STEPS = (REVOLUTION / 20_000, REVOLUTION / 200, REVOLUTION / 4e9)
-"""First, longest and shortest step of a whole bearing [rad of the cage]."""
-BEARING_MOST = 5_000.0
-"""Most steps of a whole bearing from strobe to strobe, or in a sixteenth of a revolution; more with slow shafts."""
-TIME_STEPS, TIME_MOST = (1e-5, 1.0, 1e-10), 200_000.0
-"""The same over time, in units of the time from strobe to strobe; most steps in that time."""
+MOST_AT = 1e-6
+"""Tolerance from which on a model's limit of the number of steps holds; smaller ones take more."""
 LARGEST_WRITTEN_OUT = 64
 """Dimension up to which an implicit step, whose linear solve is written out, has machine code."""
 WAKES = 0.1
@@ -56,68 +45,6 @@ RETRIES = 3
 """A lane whose error is too large is run again at most so many times, each with a tolerance 16 times smaller."""
 CHUNK = 4096
 """Lanes that are run at a time, where a strobe state is kept of each sample."""
-
-
-class Runner:
-    """The compiled loop of a field, called with lanes."""
-
-    def __init__(self, field: Field, pair: str, width: int = WIDTH):
-        self.field, self._width = field, width
-        self.rows: Layout = layout_of(field, len(Tableau.named(pair).phase))
-        whole, place = ctypes.c_int64, ctypes.c_void_p
-        kind = ctypes.CFUNCTYPE(None, place, whole, whole, whole, *[place] * 6)
-        self._march = kind(function(march_ir(field, pair, width), "march"))
-
-    def __call__(
-        self,
-        numbers: tuple[Float[np.ndarray, "wide lanes"], Float[np.ndarray, " shared"]],
-        state: Float[np.ndarray, "lanes numbers"],
-        strobes: int,
-        keep: int,
-        settings: Float[np.ndarray, " 4"],
-        step: Float[np.ndarray, " lanes"],
-        tangents: Float[np.ndarray, "lanes tangents dim"] | None,
-        threads: int,
-        report: Callable[[int], None],
-    ) -> March:
-        """Run lanes; `settings` are tolerance, longest and shortest step, and most steps from strobe to strobe."""
-        lanes, field, rows = len(state), self.field, self.rows
-        n, moving = field.dimension, field.moving
-        loaded = np.zeros((rows.end("fixed"), lanes))
-        loaded[:n], loaded[moving - field.beside : moving] = state[:, :n].T, state[:, n:].T
-        if field.tangents:
-            assert tangents is not None
-            loaded[n : moving - field.beside] = tangents.reshape(lanes, -1).T
-        loaded[rows["step"][0]] = step
-        loaded[rows["peak"]] = 0.0 if field.excursion is not None else -np.inf
-        wide, shared = numbers
-        loaded[rows.end("mark") :] = wide
-        stored = np.zeros((rows.end("mark"), lanes))
-        strobe = np.full((lanes, keep, field.recorded), np.nan)
-        growth = np.full((lanes, strobes, field.tangents), np.nan)
-        queue = np.zeros(2, dtype=np.int64)
-        arrays = (queue, np.asarray(settings, dtype=float), np.append(shared, 0.0), loaded, stored, strobe, growth)
-        at = [x.ctypes.data for x in arrays]
-        run = lambda: self._march(at[0], lanes, strobes, keep, *at[1:])
-        _run_threads(run, min(threads, -(-lanes // self._width)), queue, lambda: report(min(int(queue[0]), lanes)))
-        part = lambda name: stored[rows[name][0]]
-        turned = np.roll(strobe, -strobes % keep, axis=1)  # the latest last
-        numbers_of, peaks = n + field.beside, part("peak")[:, None, None]
-        if field.recorded > numbers_of:
-            peaks = turned[..., numbers_of:]
-        with np.errstate(divide="ignore"):
-            grown = 0.5 * np.log(growth)
-        end = np.concatenate([stored[:n], stored[moving - field.beside : moving]])
-        return March(
-            state=end.T.copy(),
-            tangents=stored[n : moving - field.beside].T.reshape(lanes, field.tangents, n),
-            step=part("step"),
-            peaks=peaks,
-            steps=part("steps"),
-            mark=part("mark"),
-            strobe=turned[..., :numbers_of],
-            growth=grown,
-        )
 
 
 class Engine:
@@ -139,18 +66,25 @@ class Engine:
         tableau = Tableau.named(pair)
         self.numbers, self._samples, self._pair, self._order = Numbers(system, several), samples, pair, tableau.order
         self.field = traced_field(system, self.numbers.form, self.numbers.wide, tangents, samples > 1, tableau.implicit)
-        self._largest = REVOLUTION / max(FEWEST_STEPS, 2 * system.harmonics)
-        self._bearing, self._over_time = isinstance(system, BearingModel), not getattr(system, "over_angle", True)
-        self._runners = {WIDTH: Runner(self.field, pair, WIDTH)}
+        self._rows = layout_of(self.field, len(tableau.phase))
+        longest = min(system.steps.longest, REVOLUTION / (2 * system.harmonics))
+        self._limits, self._compiled = system.steps._replace(longest=longest), functools.cache(self._march_of)
+        self._compiled(WIDTH)
+
+    def _march_of(self, width: int) -> Any:
+        """The compiled loop for vectors of so many lanes."""
+        whole, place = ctypes.c_int64, ctypes.c_void_p
+        kind = ctypes.CFUNCTYPE(None, place, whole, whole, whole, *[place] * 6)
+        return kind(function(march_ir(self.field, self._pair, width), "march"))
 
     @staticmethod
     def picked(numbers: Any, lanes: Any) -> Any:
         """The numbers of some lanes."""
-        return numbers[0][:, lanes], numbers[1]
+        return numbers._replace(wide=numbers.wide[:, lanes], slow=numbers.slow[lanes])
 
     def __call__(
         self,
-        numbers: tuple[Float[np.ndarray, "wide lanes"], Float[np.ndarray, " shared"]],
+        numbers: LaneNumbers,
         state: Float[np.ndarray, "lanes numbers"],
         strobes: int,
         keep: int,
@@ -166,38 +100,57 @@ class Engine:
         """Run lanes from states in units of their scales, the values of what is integrated beside them behind.
 
         **Arguments:** numbers of the lanes; states; strobe states to run to, and to keep; a method with a tolerance;
-        which sample of a revolution the first state is, of all lanes or of each; phase from strobe to strobe (over
-        time: time) if it is not a revolution over its samples, of all lanes or of each; tangent vectors in units of the
-        scale; first step, of all lanes or of each, NaN where the engine chooses; threads; a function that is called
-        with the number of lanes done.
+        which sample of a revolution the first state is, of all lanes or of each; phase from strobe to strobe if it is
+        not a revolution over its samples, of all lanes or of each; tangent vectors in units of the scale; first step,
+        of all lanes or of each, NaN where the engine chooses; threads; a function that is called with the number of
+        lanes done.
         """
-        turned = REVOLUTION / self._samples if turn is None else turn
-        if self.field.own_turn:
-            own = np.empty((SAMPLED, len(state)))
-            own[0], own[1] = turned, begin
-            numbers = np.concatenate([own, numbers[0]]), numbers[1]
-        first, *limits = self._limits(numbers, float(np.max(turned)), method.tolerance)
-        # A vector of one lane is faster than one of eight that holds one.
-        width = 1 if self._bearing and len(state) == 1 else WIDTH
-        if width not in self._runners:
-            self._runners[width] = Runner(self.field, self._pair, width)
-        settings = np.array([method.tolerance, *limits])
-        given = np.broadcast_to(np.nan if step is None else step, len(state))
-        step = np.where(np.isnan(given), first, given)
-        return self._runners[width](numbers, state, strobes, keep, settings, step, tangents, threads, report)
-
-    def _limits(self, numbers: Any, turn: float, tolerance: float) -> tuple[float, float, float, float]:
-        """First, longest and shortest step, and most steps from strobe to strobe."""
-        more = max(1.0, MOST_AT / tolerance) ** (1 / self._order)
-        if not self._bearing:
-            return FIRST_STEP, self._largest, SMALLEST_STEP, MOST_STEPS * more
-        if self._over_time:
-            first, longest, shortest = (turn * x for x in TIME_STEPS)
-            return first, longest, shortest, TIME_MOST * more
-        wide, shared = iter(numbers[0][SAMPLED:]), iter(numbers[1])
-        at, _, scale = self.numbers.form.filled([next(wide if w else shared) for w in self.numbers.wide])
-        slow = float(np.max(slowness(*map(np.asarray, (scale[2], scale[3], at.rolling_cage_speed)))))
-        return *BEARING_STEPS, BEARING_MOST * max(1.0, 16 * turn / REVOLUTION) * slow * more
+        lanes, field, rows = len(state), self.field, self._rows
+        n, moving = field.dimension, field.moving
+        limits, more = self._limits, max(1.0, MOST_AT / method.tolerance) ** (1 / self._order)
+        most = limits.most * float(np.max(numbers.slow)) * more
+        loaded = np.zeros((rows.end("fixed"), lanes))
+        loaded[:n], loaded[moving - field.beside : moving] = state[:, :n].T, state[:, n:].T
+        if field.tangents:
+            assert tangents is not None
+            loaded[n : moving - field.beside] = tangents.reshape(lanes, -1).T
+        given = np.broadcast_to(np.nan if step is None else step, lanes)
+        loaded[rows["step"][0]] = np.where(np.isnan(given), limits.first, given)
+        loaded[rows["peak"]] = 0.0 if field.excursion is not None else -np.inf
+        wide = loaded[rows.end("mark") :]
+        if field.own_turn:
+            wide[0], wide[1] = REVOLUTION / self._samples if turn is None else turn, begin
+        wide[SAMPLED * field.own_turn :] = numbers.wide
+        stored = np.zeros((rows.end("mark"), lanes))
+        strobe = np.full((lanes, keep, field.recorded), np.nan)
+        growth = np.full((lanes, strobes, field.tangents), np.nan)
+        queue = np.zeros(2, dtype=np.int64)
+        settings = np.array([method.tolerance, limits.longest, limits.shortest, most])
+        arrays = (queue, settings, np.append(numbers.shared, 0.0), loaded, stored, strobe, growth)
+        at = [x.ctypes.data for x in arrays]
+        # A vector of one lane is faster than one of eight that holds one, where a law is large.
+        width = 1 if field.excursion is None and lanes == 1 else WIDTH
+        march = self._compiled(width)
+        run = lambda: march(at[0], lanes, strobes, keep, *at[1:])
+        _run_threads(run, min(threads, -(-lanes // width)), queue, lambda: report(min(int(queue[0]), lanes)))
+        part = lambda name: stored[rows[name][0]]
+        turned = np.roll(strobe, -strobes % keep, axis=1)  # the latest last
+        numbers_of, peaks = n + field.beside, part("peak")[:, None, None]
+        if field.recorded > numbers_of:
+            peaks = turned[..., numbers_of:]
+        with np.errstate(divide="ignore"):
+            grown = 0.5 * np.log(growth)
+        end = np.concatenate([stored[:n], stored[moving - field.beside : moving]])
+        return March(
+            state=end.T.copy(),
+            tangents=stored[n : moving - field.beside].T.reshape(lanes, field.tangents, n),
+            step=part("step"),
+            peaks=peaks,
+            steps=part("steps"),
+            mark=part("mark"),
+            strobe=turned[..., :numbers_of],
+            growth=grown,
+        )
 
 
 def _run_threads(run: Callable[[], None], count: int, queue: np.ndarray, report: Callable[[], None]) -> None:
@@ -228,7 +181,11 @@ def engine_of(
     **Arguments:** model; tangent vectors; true if lanes have designs of their own; method; strobe states of a
     revolution. A warning names an operation without machine code.
     """
-    pair = method.pair if isinstance(method, NativeSteps) and has_machine_code(system, method) else None
+    pair = method.pair if isinstance(method, NativeSteps) else None
+    if pair == IMPLICIT and not has_implicit(system):
+        pair = None
+    if system.beside and pair is None:
+        raise ArgumentError("method", said="must be `native`, with an explicit pair, for this model.")
     key = (split(system, eqx.is_inexact_array)[0], tangents, several, pair, samples)
     if key not in _engines and pair is not None:
         try:
@@ -238,11 +195,9 @@ def engine_of(
     return _engines.setdefault(key, JaxEngine(system, tangents, several, samples))
 
 
-def has_machine_code(system: AbstractForcedSystem, method: NativeSteps) -> bool:
-    """False for implicit steps of large systems, and for a quasi-static ring, which moves with all rollers."""
-    large = system.dimension > LARGEST_WRITTEN_OUT
-    settles = isinstance(system, BearingModel) and system.ring.ring_motion == "quasi_static"
-    return not settles and not (large and method.pair == IMPLICIT)
+def has_implicit(system: AbstractForcedSystem) -> bool:
+    """True if implicit steps of a model have machine code."""
+    return system.dimension <= LARGEST_WRITTEN_OUT and not system.beside
 
 
 def alike(designs: Sequence[Any], name: str, kind: str) -> list[Any]:
@@ -331,27 +286,33 @@ class Lanes:
         self, some: Int[np.ndarray, " some"], y: Float[np.ndarray, "some numbers"]
     ) -> tuple[Float[np.ndarray, "some numbers"], Float[np.ndarray, " some"]]:
         """Scale of each of some lanes, 1 for what is integrated beside the state, and excursion of its state."""
-        count = some.size
+        count, dim = some.size, self.system.dimension
         room = room_for(count)
         filled = np.concatenate([some, np.broadcast_to(some[-1:], room - count)])
-        states = np.concatenate([y, np.broadcast_to(y[-1:], (room - count, y.shape[1]))])
-        dim = self.system.dimension
-        scale, excursion = _scales(self.form, self.several)(self.speed[filled], self.rows(filled), states[:, :dim])
+        states = np.concatenate([y[:, :dim], np.broadcast_to(y[-1:, :dim], (room - count, dim))])
+        scale, excursion = self.each(_scale_and_excursion, filled, states)
         ones = np.ones((count, y.shape[1] - dim))
-        return np.concatenate([np.asarray(scale)[:count], ones], axis=1), np.asarray(excursion)[:count]
+        return np.concatenate([scale[:count], ones], axis=1), excursion[:count]
+
+    def each(self, f: Callable[..., Any], some: Int[np.ndarray, " some"], *arrays: np.ndarray) -> Any:
+        """`f(model, speed, ...)` of some lanes, a function of a module; arrays have the lanes first."""
+        rows = [jnp.asarray(x) for x in self.rows(some)]
+        given = [jnp.asarray(x) for x in (self.speed[some], *arrays)]
+        return jax.tree.map(np.asarray, _mapped(f, self.form, self.several, rows, *given))
 
 
-@functools.lru_cache(maxsize=32)
-def _scales(form: Any, several: bool) -> Any:
-    """Scales and excursions of lanes, by speed, numbers of the system and state."""
+@compiled
+def _mapped(f: Callable[..., Any], form: Form, several: bool, rows: Any, speed: Array, *arrays: Array) -> Any:
+    def lane(row: Any, speed: Array, *arrays: Array) -> Any:
+        return jax.tree.map(lambda x: jnp.asarray(x, float), f(form.filled(row), speed, *arrays))
 
-    def of(speed: Any, row: Any, y: Any) -> tuple[Any, Any]:
-        system = form.filled(row)
-        scale, state = system.scale(speed), y if system.beside else tuple(y)
-        row = scale if system.beside else jnp.stack([jnp.asarray(s, float) for s in scale])
-        return row, jnp.asarray(system.excursion(state))
+    return jax.vmap(lane, in_axes=(0 if several else None, 0, *(0 for _ in arrays)))(rows, speed, *arrays)
 
-    return jax.jit(jax.vmap(of, in_axes=(0, 0 if several else None, 0)))
+
+def _scale_and_excursion(system: AbstractForcedSystem, speed: Array, y: Array) -> tuple[Array, Any]:
+    scale, state = system.scale(speed), y if system.beside else tuple(y)
+    row = scale if system.beside else jnp.stack([jnp.asarray(s, float) for s in scale])
+    return row, system.excursion(state)
 
 
 def histories(

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from .._form import Form, split
+from .._pytrees import Form, split
 from ..forces import cos_sin
 from ..models import (
     BESIDE,
@@ -28,7 +28,7 @@ from ..models import (
 from .ir import Code, UnknownOperation, Value, is_variable, number
 from .layout import Field, Layout, fixed_numbers
 from .program import Program, Sizes, program_of
-from .solvers import RODAS4, rosenbrock_step
+from .solvers import rosenbrock_step
 
 
 SAMPLED = 2
@@ -72,7 +72,7 @@ class _Step:
         n, (h, *rest) = self.dimension, moved
 
         def go(y: Any) -> Any:
-            y1, error, *_ = rosenbrock_step(RODAS4, ScaledField(field, scale), phase, lambda _: h, y)
+            y1, error, *_ = rosenbrock_step(ScaledField(field, scale), phase, lambda _: h, y)
             return tuple(jnp.asarray(c, float) for c in (*y1, *error))
 
         y = tuple(rest[:n])
@@ -151,6 +151,16 @@ def room_for(lanes: int) -> int:
     return 8 ** max(1, -(-(lanes - 1).bit_length() // 3))
 
 
+class LaneNumbers(NamedTuple):
+    """The numbers of a field in each lane."""
+
+    wide: Float[np.ndarray, "wide lanes"]
+    """Those that differ from lane to lane."""
+    shared: Float[np.ndarray, " shared"]
+    slow: Float[np.ndarray, " lanes"]
+    """Factor of the most steps (`AbstractForcedSystem.slowness`)."""
+
+
 class Numbers:
     """The numbers of a field, as they follow from a system's and a speed."""
 
@@ -170,20 +180,19 @@ class Numbers:
             if any(is_variable(v) and v in moved for v in e.invars):
                 moved.update(e.outvars)
         self.wide = tuple(several or (is_variable(v) and v in moved) for v in traced.outvars)
-        self._over = jax.jit(lambda speeds, rows: jax.vmap(of, in_axes=(0, 0 if several else None))(speeds, rows))
+        both = lambda speed, row: (of(speed, row), jnp.asarray(self._form.filled(row).slowness(speed), float))
+        self._over = jax.jit(lambda speeds, rows: jax.vmap(both, in_axes=(0, 0 if several else None))(speeds, rows))
 
-    def __call__(
-        self, speeds: Float[np.ndarray, " lanes"], rows: Sequence[Any]
-    ) -> tuple[Float[np.ndarray, "wide lanes"], Float[np.ndarray, " shared"]]:
-        """The numbers that differ from lane to lane, and those that all lanes share."""
+    def __call__(self, speeds: Float[np.ndarray, " lanes"], rows: Sequence[Any]) -> LaneNumbers:
+        """The numbers of lanes at these speeds, with the numbers of their designs."""
         count = len(speeds)
         room = room_for(count)
         pad = lambda x: np.concatenate([x, np.broadcast_to(x[-1:], (room - count, *x.shape[1:]))])
         filled = [pad(np.asarray(x)) for x in rows] if self.several else list(rows)
-        found = [np.asarray(x) for x in self._over(pad(speeds), filled)]
+        found, slow = jax.tree.map(np.asarray, self._over(pad(speeds), filled))
         wide = [x[:count] for x, w in zip(found, self.wide, strict=True) if w]
         shared = [x[0] for x, w in zip(found, self.wide, strict=True) if not w]
-        return np.array(wide).reshape(len(wide), count), np.array(shared, dtype=float)
+        return LaneNumbers(np.array(wide).reshape(len(wide), count), np.array(shared, dtype=float), slow[:count])
 
 
 def traced_field(
@@ -264,7 +273,7 @@ class _Bodies:
         def go(y: Any) -> tuple[Any, Any]:
             cage = Bodies(*(a * u for a, u in zip(y, units, strict=False)))
             land = at.on_land(cage)
-            rates, integrals, _ = at.body_rates(cage, (cos, sin), Passed(*y[OF_BODIES:], *rest), land)
+            rates, integrals = at.body_rates(cage, (cos, sin), Passed(*y[OF_BODIES:], *rest), land)
             pace = at.pace(cage.cage_speed)
             rates = [pace * x / u for x, u in zip(rates, units, strict=True)]
             beside = [pace * x for x in (cage.cage_speed, 1.0, *integrals)]

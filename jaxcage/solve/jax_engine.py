@@ -10,11 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from .._form import Form, compiled, split
+from .._pytrees import Form, compiled, split
 from ..models import AbstractForcedSystem, divide, multiply
-from .method import REVOLUTION, AbstractMethod, BesideField, moved_by
+from .method import REVOLUTION, AbstractMethod, moved_by
 from .outcomes import MARKS, OUTCOMES, March
-from .revolution import StrobeMap
+from .strobe_map import StrobeMap
 
 
 UNIT, MOST = 8, 256
@@ -38,16 +38,13 @@ def _strobe(
     def lane(own: Any, y: Array, tangents: Array, i: Array, parts: Any) -> tuple[Array, Array, Array, Array]:
         speed, *numbers = own
         system = form.filled(numbers if several else shared)
-        field, scale, dim = system.at_speed(speed), system.scale(speed), system.dimension
-        if system.beside:
-            field, scale = BesideField(field), (scale, jnp.ones(len(system.beside)))
+        field, scale = system.at_speed(speed), system.scale(speed)
         strobe = StrobeMap(field, system, scale, method)
-        state = lambda row: multiply((row[:dim], row[dim:]) if system.beside else tuple(row), scale)
+        state = lambda row: multiply(tuple(row), scale)
         moved: Any = moved_by(lambda z: strobe.part(z, i, parts), state(y), [state(t) for t in tangents])
-        joined = jnp.concatenate if system.beside else jnp.stack
-        row = lambda z: joined(divide(z, scale))
+        row = lambda z: jnp.stack(divide(z, scale))
         after = jnp.stack([row(t) for t in moved.tangents]) if moved.tangents else tangents
-        return row(moved.y), after, jnp.atleast_1d(moved.peak), moved.outcome
+        return row(moved.y), after, moved.peak, moved.outcome
 
     if isinstance(parts, int):
         return jax.vmap(lambda own, y, tangents, i: lane(own, y, tangents, i, parts))(list(own), y, tangents, i)
@@ -79,7 +76,6 @@ class JaxEngine:
         """`samples` is the number of strobe states of a revolution."""
         self._form, _ = split(system, eqx.is_inexact_array)
         self._several, self._tangents, self._samples = several, tangents, samples
-        self._recorded = len(system.watched) if system.beside else 0
 
     def numbers(self, speeds: Float[np.ndarray, " lanes"], rows: Sequence[Any]) -> Any:
         """The numbers that lanes have of their own, and those that all share."""
@@ -112,9 +108,7 @@ class JaxEngine:
         chosen, y, m = method.in_jax, state.copy(), self._tangents
         t = np.zeros((lanes, 0, dim)) if tangents is None else tangents.copy()
         strobe, growth = np.full((lanes, keep, dim), np.nan), np.full((lanes, strobes, m), np.nan)
-        peaks = np.full((lanes, keep, self._recorded), np.nan) if self._recorded else np.zeros((lanes, 1, 1))
-        unit = 1 if self._recorded else UNIT
-        mark, size = np.zeros(lanes), min(MOST, -(-lanes // (unit * threads)) * unit)
+        mark, peaks, size = np.zeros(lanes), np.zeros(lanes), min(MOST, -(-lanes // (UNIT * threads)) * UNIT)
         first = np.broadcast_to(np.asarray(begin, dtype=int), lanes)
         parts = None if turn is None else np.broadcast_to(REVOLUTION / np.asarray(turn, dtype=float), lanes)
 
@@ -134,15 +128,14 @@ class JaxEngine:
                 some = np.split(alive, range(size, alive.size, size))
                 found = list(pool.map(lambda some, k=k: chunk(some, k), some))
                 y1, t1, peak, codes = (np.concatenate(x) for x in zip(*found, strict=True))
-                lost, place = codes != 0, k % keep if self._recorded else 0
+                lost = codes != 0
                 mark[alive[lost]] = [MARKS[OUTCOMES[code]] for code in codes[lost]]
-                peaks[alive, place] = peak if self._recorded else np.maximum(peaks[alive, 0], peak)
+                peaks[alive] = np.maximum(peaks[alive], peak)
                 alive, y1, t1 = alive[~lost], y1[~lost], t1[~lost]
                 y[alive], strobe[alive, k % keep] = y1, y1
                 if m and alive.size:
                     t[alive], growth[alive, k] = _orthonormalised(t1)
                 report(int(lanes * (k + 1) / strobes))
         mark[mark == 0] = MARKS["successful"]
-        latest_last = lambda x: np.roll(x, -strobes % keep, axis=1)
-        peaks = latest_last(peaks) if self._recorded else peaks
-        return March(y, t, np.zeros(lanes), peaks, np.zeros(lanes), mark, latest_last(strobe), growth)
+        latest_last, none = np.roll(strobe, -strobes % keep, axis=1), np.zeros(lanes)
+        return March(y, t, none, peaks[:, None, None], none, mark, latest_last, growth)

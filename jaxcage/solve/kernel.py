@@ -13,16 +13,15 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from .._form import Form, split
-from .._types import Scalar, State
+from .._pytrees import Form, Scalar, State, split
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, AbstractLinearisation
 from .layout import REVOLUTION
+from .march import march_with_tangents
 from .program import Numbers
-from .solvers import AbstractRosenbrock, NewmarkBeta, explicit_step, rosenbrock_step
-from .steps import march_with_tangents
+from .solvers import Rodas4, explicit_step, rosenbrock_step
 
 
-KernelSolver = AbstractRosenbrock | NewmarkBeta | dfx.AbstractERK
+KernelSolver = Rodas4 | dfx.AbstractERK
 
 
 class Pieces(NamedTuple):
@@ -37,7 +36,7 @@ def can_be_kernel(solver: Any) -> TypeGuard[KernelSolver]:
     """True if a step of `solver` is a plain formula, as of ours, and of explicit methods whose last stage is kept."""
     if isinstance(solver, dfx.AbstractERK):
         return isinstance(solver.tableau, dfx.ButcherTableau) and solver.tableau.fsal
-    return isinstance(solver, AbstractRosenbrock | NewmarkBeta)
+    return isinstance(solver, Rodas4)
 
 
 NEARNESS = 0.2
@@ -85,8 +84,7 @@ class _CalledField(AbstractField):
 @dataclasses.dataclass(frozen=True)
 class KernelStep:
     """One step for `march`: moved is the state; watched the largest excursion and, where steps are shortened, the
-    phase and the length of the step, by Newmark's method by how much a defect was too large; fixed the first phase, the
-    step, the phase at the end, and the numbers of (field, system, scale)."""
+    phase; fixed the first phase, the step, the phase at the end, and the numbers of (field, system, scale)."""
 
     solver: KernelSolver
     structure: Form
@@ -94,11 +92,9 @@ class KernelStep:
     """True if the law changes abruptly somewhere: steps are shortened there."""
 
     def watched(self, phase: Any) -> Numbers:
-        """First values of the watched numbers: the excursion, the phase and the length of the step, or the defect."""
+        """First values of the watched numbers: the excursion and the phase."""
         zero = jnp.zeros(())
-        if isinstance(self.solver, NewmarkBeta):
-            return zero, zero
-        return (zero, zero + phase, zero) if self.abrupt else (zero,)
+        return (zero, zero + phase) if self.abrupt else (zero,)
 
     def __call__(self, i: Any, moved: State, watched: Numbers, fixed: Numbers) -> tuple[State, Numbers]:
         phase, h, end, *numbers = fixed
@@ -106,9 +102,6 @@ class KernelStep:
         field = _CalledField(self.structure, tuple(numbers))
         peak, *clock = watched
         t0 = clock[0] if self.abrupt else phase + i * h
-        if isinstance(self.solver, NewmarkBeta):
-            y, excess = self.solver.advance(self.structure.filled(numbers)[0], t0, t0 + h, moved)
-            return y, (jnp.maximum(peak, jnp.asarray(system.excursion(y))), jnp.maximum(clock[0], excess))
 
         def size(rate: State) -> Scalar:
             return shortened(h, system.abrupt(moved, rate), t0, end) if self.abrupt else h
@@ -117,11 +110,11 @@ class KernelStep:
             assert isinstance(self.solver.tableau, dfx.ButcherTableau)
             y, step = explicit_step(self.solver.tableau, field, t0, size, moved)
         else:
-            y, _, _, step = rosenbrock_step(self.solver.tableau, field, t0, size, moved)
+            y, _, _, step = rosenbrock_step(field, t0, size, moved)
             if self.abrupt:  # no step at all divides by zero
                 y = tuple(jnp.where(step > 0, a, b) for a, b in zip(y, moved, strict=True))
         if self.abrupt:
-            clock = [t0 + step, step]
+            clock = [t0 + step]
         return y, (jnp.maximum(peak, jnp.asarray(system.excursion(y))), *clock)  # the maximum keeps a NaN
 
 
@@ -131,12 +124,12 @@ def kernel_step(
     """A step and its fixed numbers behind phases and step size; system and scale have no derivative."""
     watching = jax.tree.map(lambda x: jax.lax.stop_gradient(x) if eqx.is_array(x) else x, (system, scale))
     structure, numbers = split((field, *watching), eqx.is_inexact_array)
-    abrupt = system.abrupt(scale, scale) is not None and not isinstance(solver, NewmarkBeta)  # its steps are equal
+    abrupt = system.abrupt(scale, scale) is not None
     return KernelStep(solver, structure, abrupt), numbers
 
 
 def steps_through(
-    solver: KernelSolver,
+    solver: Any,
     steps: Any,
     pieces: Pieces,
     y: State,
@@ -144,14 +137,13 @@ def steps_through(
     drifts: Sequence[Sequence[Any] | None] = (),
     phase: Any = 0.0,
     parts: Any = 1,
-) -> tuple[State, Scalar, dfx.RESULTS, tuple[State, ...]]:
+) -> tuple[State, Scalar, tuple[State, ...]]:
     """One `parts`-th of a revolution of `steps` steps, and as many more as abrupt changes of the law ask for.
 
     **Arguments:** solver; steps of a revolution; what is integrated; state; tangent vectors, and for each of
     them the tangents of the field's numbers, None where there are none; phase and part.
 
-    **Returns:** the state after it, the largest excursion on the way, whether the steps' own iteration converged, the
-    tangent vectors.
+    **Returns:** the state after it, the largest excursion on the way, the tangent vectors.
     """
     step, numbers = kernel_step(solver, *pieces)
     count, h = steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float)
@@ -170,8 +162,5 @@ def steps_through(
         # A lane that is lost ends the loop: it is far out, or its phase is NaN.
         through = lambda c: (c[1][1] < end) & (c[1][0] <= ESCAPE)
         carry = jax.lax.while_loop(through, lambda c: go(c, more), carry)
-    y, (peak, *others), after = carry
-    result = dfx.RESULTS.successful
-    if isinstance(solver, NewmarkBeta):
-        result = dfx.RESULTS.where(others[0] <= 0, result, dfx.RESULTS.nonlinear_divergence)  # pyright: ignore
-    return y, peak, result, tuple(after)
+    y, (peak, *_), after = carry
+    return y, peak, tuple(after)

@@ -9,30 +9,25 @@ import diffrax as dfx
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import optimistix as optx
 from jaxtyping import Array, Int
 
 from .._errors import ArgumentError
-from .._types import Scalar, State
+from .._pytrees import Scalar, State
 from ..models import (
     ESCAPE,
-    AbstractField,
-    AbstractLinearisation,
     ScaledField,
     divide,
     multiply,
 )
 from .kernel import REVOLUTION, Pieces, can_be_kernel, steps_through
 from .layout import PAIRS
+from .march import with_tangents
 from .outcomes import RESULTS, outcome_code
-from .solvers import ClassicalRK4, NewmarkBeta, Rodas3, Rodas4
-from .steps import with_tangents
+from .solvers import ClassicalRK4, Rodas4
 
 
 FIRST_STEPS = 64
 """The first of adaptive steps is a revolution over so many."""
-MOST_WATCHED = 4096
-"""Most adaptive steps from sample to sample, where values of each step are stored."""
 SHARPER = 1e-2
 """Tolerance of the run that measures errors, as a fraction of the tolerance."""
 DEFAULT_TOLERANCE = 1e-6
@@ -81,19 +76,8 @@ def _evaluate(tau: Any, y: Any, field: Any) -> State:
     return field(tau, y)
 
 
-def _nothing(tau: Any, y: Any, field: Any) -> State:
-    del tau, field
-    return tuple(jnp.zeros_like(c) for c in y)
-
-
 TERM = dfx.ODETerm(_evaluate)
 """The diffrax term of every field: the field itself travels as `args`, where solvers can use its structure."""
-ALL_IMPLICIT = dfx.MultiTerm(dfx.ODETerm(_nothing), TERM)
-"""The same for solvers that split their terms: everything in the implicit one."""
-
-
-def _term(solver: dfx.AbstractSolver) -> Any:
-    return ALL_IMPLICIT if isinstance(solver, dfx.KenCarp3 | dfx.KenCarp4 | dfx.KenCarp5) else TERM
 
 
 class AbstractMethod(eqx.Module):
@@ -123,78 +107,15 @@ class AbstractMethod(eqx.Module):
         """Go one `parts`-th of a revolution from state `y` at `phase`."""
 
 
-def result_at(result: Any, y: State, excursion: Scalar, limit: Scalar) -> RESULTS:
+def result_at(result: Any, y: State, excursion: Scalar) -> RESULTS:
     """The result of a state that a solver returned with one of diffrax's results."""
     finite = jnp.isfinite(sum(jnp.sum(jnp.abs(c)) for c in y))
-    state = RESULTS.where(excursion <= limit, RESULTS.successful, RESULTS.outside)  # pyright: ignore
+    state = RESULTS.where(excursion <= ESCAPE, RESULTS.successful, RESULTS.outside)  # pyright: ignore
     state = RESULTS.where(finite, state, RESULTS.not_finite)  # pyright: ignore
     if result is dfx.RESULTS.successful:  # what is known to be well is not promoted: that takes ten small programs
         return state  # pyright: ignore
     before = RESULTS.promote(result)
     return RESULTS.where(before == RESULTS.successful, state, before)  # pyright: ignore
-
-
-def run_steps(
-    solver: dfx.AbstractSolver,
-    steps: Int[Array, ""] | int,
-    pieces: Pieces,
-    y: State,
-    phase: Scalar,
-    parts: Int[Array, ""] | Scalar,
-) -> Stretch:
-    """One `parts`-th of a revolution of so many equal steps, in a single lane."""
-    if isinstance(steps, int) and isinstance(parts, int):
-        if steps % parts:
-            raise ArgumentError("parts", said=f"must divide the {steps} steps per revolution, but it is {parts}.")
-    if can_be_kernel(solver):
-        y, peak, result, _ = steps_through(solver, steps, pieces, y, phase=phase, parts=parts)
-        return Stretch(y, peak, result_at(result, y, peak, ESCAPE))
-    return _by_solver(solver, steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float), pieces, y, phase)
-
-
-def _by_solver(solver: Any, count: Any, h: Scalar, pieces: Pieces, y: State, phase: Scalar) -> Stretch:
-    """The same with a diffrax solver's own step."""
-    field, system, scale = pieces
-    term = _term(solver)
-    if isinstance(solver, dfx.AbstractImplicitSolver):  # its Newton tolerance is one number for all components
-        field, y = ScaledField(field, scale), divide(y, scale)
-        unscale = lambda state: multiply(state, scale)
-    else:
-        unscale = lambda state: state
-
-    def step(i: Array, carry: tuple) -> tuple:
-        y, peak, result, state = carry
-        t0 = phase + i.astype(float) * h
-        y, _, _, state, outcome = solver.step(term, t0, t0 + h, y, field, state, False)
-        if outcome is not dfx.RESULTS.successful:  # solvers that cannot fail say so without tracing anything
-            result = dfx.RESULTS.where(result == dfx.RESULTS.successful, outcome, result)
-        excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(unscale(y))))
-        return y, jnp.maximum(peak, excursion), result, state  # the maximum keeps a NaN
-
-    state = solver.init(term, phase, phase + h, y, field)
-    start = (y, jnp.zeros(()), dfx.RESULTS.successful, state)
-    y, peak, result, _ = jax.lax.fori_loop(0, count, step, start)
-    y = unscale(y)
-    return Stretch(y, peak, result_at(result, y, peak, ESCAPE))
-
-
-class BesideField(AbstractField):
-    """The field of a model whose quantities beside the state are integrated too: a state is (state, those), arrays."""
-
-    field: Any
-
-    def __call__(self, tau: Scalar, y: Any) -> Any:
-        rates, beside, _ = self.field.rates_beside(*y)
-        return rates, beside
-
-    def linearise(self, tau: Scalar, y: Any) -> AbstractLinearisation:
-        raise ArgumentError(
-            "method", said="must be explicit for a whole bearing, such as `native()`, but is a Rosenbrock method."
-        )
-
-    def watch(self, y: Any) -> Array:
-        """Values of the quantities that are watched."""
-        return self.field.rates_beside(*y)[2]
 
 
 class FixedSteps(AbstractMethod):
@@ -205,6 +126,9 @@ class FixedSteps(AbstractMethod):
     """An array where one program is to serve all numbers of steps."""
 
     def __check_init__(self):
+        if not can_be_kernel(self.solver):
+            said = "must be `Rodas4`, or explicit with a last stage that is the first of the next step"
+            raise ArgumentError("solver", said=f"{said}, but is {type(self.solver).__name__}.")
         if isinstance(self.steps, int) and self.steps < 1:
             raise ArgumentError("steps", said=f"must be at least 1 per revolution, but {self.steps} was given.")
 
@@ -217,7 +141,10 @@ class FixedSteps(AbstractMethod):
         return FixedSteps(self.solver, self.steps << times)
 
     def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
-        return run_steps(self.solver, self.steps, pieces, y, phase, parts)
+        if isinstance(self.steps, int) and isinstance(parts, int) and self.steps % parts:
+            raise ArgumentError("parts", said=f"must divide the {self.steps} steps per revolution, but it is {parts}.")
+        y, peak, _ = steps_through(self.solver, self.steps, pieces, y, phase=phase, parts=parts)
+        return Stretch(y, peak, result_at(dfx.RESULTS.successful, y, peak))
 
 
 class AdaptiveSteps(AbstractMethod):
@@ -247,37 +174,26 @@ class AdaptiveSteps(AbstractMethod):
         return AdaptiveSteps(self.solver, factor * self.rtol, factor * self.atol, self.max_steps)
 
     def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
-        field: Any = pieces.field
-        system, scale = pieces.system, pieces.scale
+        field, system, scale = pieces
         length = REVOLUTION / jnp.asarray(parts, dtype=float)
-        watches = isinstance(field, BesideField)
-        saved, norm, most = dfx.SubSaveAt(t1=True), optx.rms_norm, self.max_steps
-        if watches:  # at each step, and errors of the state alone control the steps
-            seen = dfx.SubSaveAt(steps=True, fn=lambda t, y, args: field.watch(multiply(y, scale)))
-            saved, norm, most = (saved, seen), lambda y: jnp.max(jnp.abs(y[0])), min(most, MOST_WATCHED)
         solution = dfx.diffeqsolve(
-            _term(self.solver),
+            TERM,
             self.solver,
             t0=phase,
             t1=phase + length,
             dt0=jnp.minimum(REVOLUTION / FIRST_STEPS, length),
             y0=divide(y, scale),
             args=ScaledField(field, scale),
-            stepsize_controller=dfx.PIDController(self.rtol, self.atol, pcoeff=0.3, icoeff=0.4, norm=norm),
-            saveat=dfx.SaveAt(subs=saved),
+            stepsize_controller=dfx.PIDController(self.rtol, self.atol, pcoeff=0.3, icoeff=0.4),
+            saveat=dfx.SaveAt(t1=True),
             adjoint=dfx.ForwardMode(),
-            max_steps=most,
+            max_steps=self.max_steps,
             throw=False,
         )
         assert solution.ys is not None
-        if watches:
-            ends, watched = solution.ys
-            y = field.field.settled_row(*multiply(tuple(c[-1] for c in ends), scale))
-            peaks = jnp.max(jnp.where(jnp.isfinite(watched), watched, -jnp.inf), axis=0)
-            return Stretch(y, peaks, result_at(solution.result, y, peaks[0], ESCAPE))
         y = multiply(tuple(c[-1] for c in solution.ys), scale)
         excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y), dtype=float))
-        return Stretch(y, excursion, result_at(solution.result, y, excursion, ESCAPE))
+        return Stretch(y, excursion, result_at(solution.result, y, excursion))
 
 
 class NativeSteps(AbstractMethod):
@@ -326,34 +242,15 @@ class NativeSteps(AbstractMethod):
 
 
 # `scan_kind="lax"`: outside `diffeqsolve`, diffrax's own solvers are differentiable in forward mode only with this.
-_EXPLICIT: dict[str, Any] = {"scan_kind": "lax"}
-# Newton instead of diffrax's VeryChord, which with equal steps calls it divergence when it starts at the solution.
-_IMPLICIT: dict[str, Any] = {"scan_kind": "lax", "root_finder": optx.Newton(rtol=1e-8, atol=1e-8)}
-_SOLVERS: dict[str, tuple[type[dfx.AbstractSolver], dict[str, Any]]] = {
-    "rodas3": (Rodas3, {}),
-    "rodas4": (Rodas4, {}),
-    "newmark": (NewmarkBeta, {}),
-    "rk4": (ClassicalRK4, _EXPLICIT),
-    "tsit5": (dfx.Tsit5, _EXPLICIT),
-    "kvaerno3": (dfx.Kvaerno3, _IMPLICIT),
-    "kvaerno5": (dfx.Kvaerno5, _IMPLICIT),
-    "kencarp4": (dfx.KenCarp4, _IMPLICIT),
+_SOLVERS: dict[str, dfx.AbstractAdaptiveSolver] = {
+    "rodas4": Rodas4(),
+    "rk4": ClassicalRK4(scan_kind="lax"),
+    "tsit5": dfx.Tsit5(scan_kind="lax"),
+    "kvaerno3": dfx.Kvaerno3(),
+    "kvaerno5": dfx.Kvaerno5(),
 }
-"""By name, with the options that equal steps need."""
-_ADAPTIVE = {name: kind for name, (kind, _) in _SOLVERS.items() if issubclass(kind, dfx.AbstractAdaptiveSolver)}
 DEFAULT_SOLVER = "rk4"
 DEFAULT_STEPS = 1024
-
-
-def make_fixed(solver: str, steps: int) -> FixedSteps:
-    """Equal steps of a solver by name.
-
-    **Raises:** `ValueError` for a name that is not known.
-    """
-    if solver not in _SOLVERS:
-        raise ArgumentError("solver", said=f"must be one of {', '.join(_SOLVERS)}, but '{solver}' was given.")
-    kind, options = _SOLVERS[solver]
-    return FixedSteps(kind(**options), steps)
 
 
 def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: float | None = None) -> AbstractMethod:
@@ -361,23 +258,27 @@ def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: fl
 
     **Arguments:**
 
-    - `solver`: `rodas3`, `rodas4` (ours, structured), `rk4` (classical), `newmark` (the paper's), `tsit5`, `kvaerno3`,
-        `kvaerno5`, `kencarp4` (diffrax's).
+    - `solver`: `rk4` (classical), `rodas4` (ours, for stiff laws), `tsit5`, `kvaerno3`, `kvaerno5` (diffrax's, of which
+        the last two are for stiff laws and have adaptive steps only).
     - `steps`: equal steps per revolution, by default 1024.
     - `tolerance`: if given, steps are adaptive with this relative and absolute tolerance, the latter in units of the
         system's own scale.
 
     **Raises:** `ValueError` for an unknown name, or both `steps` and `tolerance`.
     """
+    if solver not in _SOLVERS:
+        raise ArgumentError("solver", said=f"must be one of {', '.join(_SOLVERS)}, but '{solver}' was given.")
+    if tolerance is None and not can_be_kernel(_SOLVERS[solver]):
+        if steps is not None:
+            raise ArgumentError("steps", said=f"must not be given for {solver}, whose steps are adaptive: `tolerance`.")
+        tolerance = DEFAULT_TOLERANCE
     if tolerance is None:
-        return make_fixed(solver, DEFAULT_STEPS if steps is None else steps)
-    if solver not in _ADAPTIVE:
-        raise ArgumentError("solver", said=f"must be one of {', '.join(_ADAPTIVE)}, but '{solver}' was given.")
+        return FixedSteps(_SOLVERS[solver], DEFAULT_STEPS if steps is None else steps)
     if steps is not None:
         raise ArgumentError("steps", "tolerance", said="must not both be given: steps are fixed or adaptive.")
     if not 0 < tolerance < 1:
         raise ArgumentError("tolerance", said=f"must lie between 0 and 1, but {tolerance} was given.")
-    return AdaptiveSteps(_ADAPTIVE[solver](), tolerance, tolerance)
+    return AdaptiveSteps(_SOLVERS[solver], tolerance, tolerance)
 
 
 def native(

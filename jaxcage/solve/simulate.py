@@ -1,7 +1,9 @@
-"""Time histories at constant speed and through a speed ramp, and of a whole bearing over time."""
+"""Time histories at constant speed and through a speed ramp."""
 
 import dataclasses
+import itertools
 import math
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -10,20 +12,18 @@ from jaxtyping import Array, Float
 
 from .._arguments import require_at_least, require_x64, shown
 from .._errors import ArgumentError
-from .._notebook import notebook_html
-from .._types import Scalar, State
+from .._pytrees import Scalar, State
 from ..models import (
     INSTEAD,
     AbstractForcedSystem,
-    BearingModel,
-    BearingOverTime,
     BearingState,
     bodies_of,
     require_known,
     require_speeds,
     rollers_of,
 )
-from .engine import CHUNK, RETRIES, Lanes, errors_of_parts, errors_of_stretches, has_machine_code
+from ..quantities import notebook_html
+from .engine import CHUNK, RETRIES, Lanes, errors_of_parts, errors_of_stretches, has_implicit
 from .kernel import REVOLUTION
 from .method import IMPLICIT, AbstractMethod, FixedSteps, NativeSteps, native
 from .outcomes import INACCURATE, OUTCOMES, codes_of
@@ -122,29 +122,17 @@ class Trajectory:
 
 def _start(system: AbstractForcedSystem, speed: float, start: Start | None) -> np.ndarray:
     """The first state, with the quantities beside it behind."""
-    rest, dim = np.array(system.beside_start, dtype=float), system.dimension
-    if isinstance(start, BearingState):
-        y0, clock = np.asarray(start.row), np.asarray(start.clock)
-        rest[:2] = clock
-    else:
-        y0 = np.array(system.starts(jnp.asarray(speed))[0] if start is None else start, dtype=float)
+    dim = system.dimension
+    y0, beside = system.first_state(system.starts(jnp.asarray(speed))[0] if start is None else start)
     if y0.shape != (dim,):
         raise ArgumentError("start", said=f"must be a state of {dim} numbers, but has {y0.size}.")
     if not np.all(np.isfinite(y0)):
         raise ArgumentError("start", said=f"must be finite numbers, but {shown(start)} was given.")
-    return np.concatenate([y0, rest])
+    return np.concatenate([y0, beside])
 
 
-def require_counts(revolutions: int, samples: int, discard: int) -> None:
-    """**Raises:** `ValueError` for counts that no history can have."""
-    require_at_least(1, revolutions=revolutions, samples=samples)
-    require_at_least(0, discard=discard)
-
-
-def _require_fits(method: AbstractMethod, system: AbstractForcedSystem, samples: int) -> None:
-    """**Raises:** `ValueError` for a method that does not go with the model or the samples."""
-    if isinstance(method, FixedSteps) and system.beside:
-        raise ArgumentError("method", said="must control its steps, as `native` does, but has a fixed number of them.")
+def _require_fits(method: AbstractMethod, samples: int) -> None:
+    """**Raises:** `ValueError` for a method that does not go with the samples."""
     if isinstance(method, FixedSteps) and method.steps % samples:
         raise ArgumentError(
             "samples", said=f"must divide the {method.steps} steps per revolution of the method, but is {samples}."
@@ -164,39 +152,23 @@ class _Ran(NamedTuple):
     """Steps tried."""
 
 
-class _Course(NamedTuple):
-    """Parts of a run, each a lane of its own at its own speed."""
+def _run(lanes: Lanes, samples: int, stretch: int, start: np.ndarray, method: AbstractMethod) -> _Ran:
+    """Parts of a run one after the other, each a lane of its own at its own speed.
 
-    lanes: Lanes
-    samples: int
-    """Parts of a revolution."""
-    turn: Float[np.ndarray, " parts"] | None
-    """Phase (or time) of each part; None if they are equal parts of a revolution."""
-    stretch: int
-    """Parts over which an error is stated."""
-
-    def turn_of(self, part: Any) -> Any:
-        """Phase of some parts."""
-        return None if self.turn is None else self.turn[part]
-
-
-def _run(course: _Course, start: np.ndarray, method: AbstractMethod) -> _Ran:
-    """The parts one after the other."""
-    lanes, samples = course.lanes, course.samples
+    **Arguments:** lanes; parts of a revolution; parts over which an error is stated; first state; method.
+    """
     n, speed, dim = lanes.speed.size, lanes.speed, lanes.system.dimension
     every, begin = np.arange(n), np.arange(n) % samples
-    engine = lanes.engine(0, method, 1 if lanes.system.beside else samples)
+    engine = lanes.engine(0, method, samples)
     numbers = lanes.numbers(engine, every)
-    even = course.turn is None or np.allclose(course.turn, course.turn[0], rtol=1e-9, atol=0)
     scale, (excursion, *_) = lanes.begin(every, np.broadcast_to(start, (n, start.size)))
     y, peaks = np.full((n + 1, start.size), np.nan), np.full((n, len(lanes.system.watched)), np.nan)
     y[0], code = start, 0 if excursion <= 1 or lanes.system.beside else OUTCOMES.index("outside")
     step, done, steps = None, 0, 0.0
     while done < n and code == 0:  # a revolution at a time if its speed does not change
-        some = samples if even and done + samples <= n and speed[done + samples - 1] == speed[done] else 1
-        at, turn = engine.picked(numbers, every[done : done + 1]), course.turn_of(done)
-        first = y[done : done + 1] / scale[done]
-        ran = engine(at, first, some, some, method, step=step, begin=begin[done : done + 1], turn=turn)
+        some = samples if done + samples <= n and speed[done + samples - 1] == speed[done] else 1
+        at, first = engine.picked(numbers, every[done : done + 1]), y[done : done + 1] / scale[done]
+        ran = engine(at, first, some, some, method, step=step, begin=begin[done : done + 1])
         y[done + 1 : done + 1 + some], code = ran.strobe[0] * scale[done], int(codes_of(ran.mark)[0])
         step, steps = ran.step if ran.step[0] else step, steps + float(ran.steps[0])
         peaks[done : done + ran.peaks.shape[1]], done = ran.peaks[0], done + some
@@ -206,37 +178,18 @@ def _run(course: _Course, start: np.ndarray, method: AbstractMethod) -> _Ran:
     apart = np.zeros(n)
     for some in np.split(ends, range(CHUNK, ends.size, CHUNK)) if ends.size else ():
         given = engine.picked(numbers, some), y[some] / scale[some], y[some + 1] / scale[some]
-        turn = course.turn_of(some)
-        apart[some] = errors_of_parts(engine, *given, dim, method, begin=begin[some], turn=turn)
-    errors = errors_of_stretches(apart, course.stretch, method)
-    return _Ran(y, peaks, errors, code, steps)
+        apart[some] = errors_of_parts(engine, *given, dim, method, begin=begin[some])
+    return _Ran(y, peaks, errors_of_stretches(apart, stretch, method), code, steps)
 
 
-def _tried(course: _Course, start: np.ndarray, method: AbstractMethod) -> _Ran:
-    """The run by the method, or by a finer one where its error is too large, or an implicit one where that serves."""
-    again = [method.finer(k) for k in range(1, RETRIES + 1)] if math.isfinite(method.allowed) else []
-    if isinstance(method, NativeSteps) and method.pair != IMPLICIT:
-        if has_machine_code(course.lanes.system, method.implicit):
-            again += [method.implicit, *(method.implicit.finer(k) for k in range(1, RETRIES + 1))]
-    served = lambda ran: ran.code not in SERVED_BADLY and not np.any(ran.errors > method.allowed)
-    first = ran = _run(course, start, method)
-    while not served(ran) and again:
-        ran = _run(course, start, again.pop(0))
-    return ran if served(ran) else first
-
-
-def _outcome(ran: _Ran, stretch: int, allowed: float) -> tuple[np.ndarray, int]:
-    """States, NaN behind a stretch whose error is too large, and how the run ended."""
-    states, code = ran.states.copy(), ran.code
-    if np.any(bad := ran.errors > allowed):
-        states[int(np.argmax(bad)) * stretch + 1 :] = np.nan
-        code = code or INACCURATE
-    return states, code
-
-
-def _chosen(system: AbstractForcedSystem, method: AbstractMethod | None) -> AbstractMethod:
-    default = native(BEARING_TOLERANCE, BEARING_ERROR) if system.beside else native(TOLERANCE)
-    return default if method is None else method
+def _methods(method: AbstractMethod, system: AbstractForcedSystem) -> Iterator[AbstractMethod]:
+    """The method, finer ones for a run whose error is too large, and implicit ones."""
+    yield method
+    finer = range(1, RETRIES + 1) if math.isfinite(method.allowed) else ()
+    yield from map(method.finer, finer)
+    if isinstance(method, NativeSteps) and has_implicit(system) and method.pair != IMPLICIT:
+        yield method.implicit
+        yield from map(method.implicit.finer, finer)
 
 
 def simulate(
@@ -257,7 +210,7 @@ def simulate(
     `jaxcage.native(1e-8)`, of a whole bearing `jaxcage.native(1e-5, 1e-2)`.
 
     **Returns:** `Trajectory`; a run that fails, or is `inaccurate`, is NaN from there on and says why in `outcome`. A
-    whole bearing whose cage comes to rest, or leaves its land, is `outside`: `bearing_over_time` follows it over time.
+    whole bearing whose cage comes to rest, or leaves its land, is `outside`.
 
     **Raises:** `ValueError` for a speed that is not positive, or impossible counts.
     """
@@ -292,9 +245,11 @@ def ramp(
     require_known("ramp", INSTEAD, system, first, last, start)
     low, high = float(first), float(last)
     require_speeds(system, (low, high))
-    require_counts(revolutions, samples, discard)
-    chosen = _chosen(system, method)
-    _require_fits(chosen, system, samples)
+    require_at_least(1, revolutions=revolutions, samples=samples)
+    require_at_least(0, discard=discard)
+    default = native(BEARING_TOLERANCE, BEARING_ERROR) if system.beside else native(TOLERANCE)
+    chosen = default if method is None else method
+    _require_fits(chosen, samples)
     rise = (high - low) / revolutions
     numbers = np.arange(-discard, revolutions)
     rises = np.where(numbers < 0, 0.0, rise)
@@ -303,11 +258,16 @@ def ramp(
     parts = min(max(1, math.ceil(REVOLUTION / samples / comparable - 1e-9)), MOST_PARTS)  # from sample to sample
     places = samples * parts
     speeds = (first_of[:, None] + rises[:, None] * ((np.arange(places) + 0.5) / places)).ravel()
-    turn = np.full(speeds.size, REVOLUTION / places) if system.beside else None
     stretch = max(1, round(comparable * places / REVOLUTION))
-    course = _Course(Lanes.of([system], speeds), places, turn, stretch)
-    ran = _tried(course, _start(system, low, start), chosen)
-    states, code = _outcome(ran, stretch, chosen.allowed)
+    lanes, y0 = Lanes.of([system], speeds), _start(system, low, start)
+    runs = (_run(lanes, places, stretch, y0, each) for each in _methods(chosen, system))
+    served = lambda ran: ran.code not in SERVED_BADLY and not np.any(ran.errors > chosen.allowed)
+    first_run = next(runs)
+    ran = next(filter(served, itertools.chain([first_run], runs)), first_run)
+    states, code = ran.states.copy(), ran.code
+    if np.any(bad := ran.errors > chosen.allowed):  # behind a stretch whose error is too large nothing is known
+        states[int(np.argmax(bad)) * stretch + 1 :] = np.nan
+        code = code or INACCURATE
 
     grid, dim = np.arange(samples) / samples, system.dimension
     speed = (first_of[:, None] + rise * grid).ravel()[discard * samples :]
@@ -319,7 +279,7 @@ def ramp(
         time = states[:, dim + system.beside.index("time")]
     else:
         states = states[:-1]
-    excursion = course.lanes.begin(np.arange(speeds.size), ran.states[:-1])[1][::places]
+    excursion = lanes.begin(np.arange(speeds.size), ran.states[:-1])[1][::places]
     peak = float(np.fmax.reduce([*ran.peaks[discard * places :, -1], *excursion[discard:]]))
     return Trajectory(
         time,
@@ -335,48 +295,4 @@ def ramp(
         watched=system.watched,
         peaks=np.fmax.reduce(ran.peaks[discard * places :].reshape(-1, parts, len(system.watched)), axis=1),
         steps=ran.steps / first_of.size,
-    )
-
-
-def bearing_over_time(
-    model: BearingModel,
-    speed: Scalar,
-    times: Float[np.ndarray, " n"],
-    *,
-    start: Start | None = None,
-    method: AbstractMethod | None = None,
-) -> Trajectory:
-    """Time history of a whole bearing with time as independent variable: for starting, coasting and free flight.
-
-    **Arguments:** model; shaft speed [rad/s]; ascending times of the samples [s], the first that of `start`; initial
-    state and integration method as in `simulate`.
-
-    **Returns:** `Trajectory`; its errors are those from sample to sample, its steps those of the whole run.
-
-    **Raises:** `ValueError` for times that do not ascend.
-    """
-    require_x64()
-    spans, value = np.diff(np.asarray(times, dtype=float)), float(speed)
-    if spans.size < 1 or not np.all(spans > 0):
-        raise ArgumentError("times", said="must be two or more that grow.")
-    system, chosen = BearingOverTime.of(model), _chosen(model, method)
-    _require_fits(chosen, system, 1)
-    course = _Course(Lanes.of([system], np.full(spans.size, value)), spans.size, spans, 1)
-    ran = _tried(course, _start(system, value, start), chosen)
-    states, code = _outcome(ran, 1, chosen.allowed)
-    dim = system.dimension
-    return Trajectory(
-        states[:, dim + 1],
-        states[:, dim],
-        states[:, :dim],
-        np.full(spans.size + 1, value),
-        spans.size,
-        float(np.fmax.reduce(ran.peaks[:, -1])),
-        OUTCOMES[code],
-        float(ran.errors.max()),
-        beside=system.beside,
-        integrals=states[:, dim:],
-        watched=system.watched,
-        peaks=ran.peaks,
-        steps=ran.steps,
     )

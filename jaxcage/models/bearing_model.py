@@ -1,6 +1,5 @@
 """The whole bearing: its parameters, states to start from, magnitudes, and ready-made bearings."""
 
-import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
@@ -13,9 +12,8 @@ from jaxtyping import Array, Float
 
 from .._arguments import is_concrete, require_x64
 from .._errors import ArgumentError
-from .._form import compiled
 from .._parameters import choice, parameter
-from .._types import Scalar
+from .._pytrees import Scalar, compiled
 from ..bearing import (
     Bearing,
     Lubricant,
@@ -27,6 +25,10 @@ from ..bearing import (
     vg,
 )
 from ..forces import Land, LandContact, RibFilm
+from .bearing_field import BearingAtSpeed
+from .bearing_history import RollerHistory, bearing_orders, roller_history
+from .bearing_quantities import QUANTITIES
+from .bearing_states import BESIDE, OF_BODIES, OF_ROLLER, WATCHED, BearingState, Bodies, Rollers
 from .cage import FASTEST
 from .contacts import (
     Guide,
@@ -39,10 +41,7 @@ from .contacts import (
     bar_stiffness,
     hunt_crossley,
 )
-from .protocol import AbstractForcedSystem
-from .whole_field import BearingAtSpeed
-from .whole_quantities import QUANTITIES
-from .whole_states import BESIDE, OF_BODIES, OF_ROLLER, WATCHED, BearingState, Bodies, Rollers
+from .protocol import AbstractForcedSystem, StepLimits
 
 
 Guided = Literal["outer", "inner"]
@@ -56,7 +55,7 @@ SAMPLES = 16
 """Strobe states of a revolution that a sweep records."""
 SPACING = TURN / 16
 PERIODS, COMPARED, SLOWEST = 50, 10, 1000.0
-"""Constants of `BearingModel.comparable` and `slowness`."""
+"""Constants of `BearingModel.comparable` and `BearingModel.slowness`."""
 
 
 class InnerRing(eqx.Module):
@@ -64,12 +63,6 @@ class InnerRing(eqx.Module):
 
     ring_mass: Scalar = parameter("kg", 1e-3, 1e4, "mass of the inner ring with its share of the shaft", default=2.0)
     mounting_damping: Scalar = parameter("N s/m", 0.0, 1e7, "damping of the inner ring's mounting", default=500.0)
-    ring_motion: str = choice(
-        "dynamic",
-        "quasi_static",
-        text="the inner ring moves by its mass, or is always where contacts carry the load",
-        default="dynamic",
-    )
 
 
 class Wear(eqx.Module):
@@ -176,8 +169,7 @@ class BearingModel(AbstractForcedSystem):
     }
     speed_text = "shaft speed"
     quantities = QUANTITIES
-    over_angle: ClassVar[bool] = True
-    """The independent variable is the cage's angle."""
+    steps = StepLimits(TURN / 20_000, TURN / 200, TURN / 4e9, 5_000.0)
 
     @property
     def dimension(self) -> int:
@@ -216,7 +208,7 @@ class BearingModel(AbstractForcedSystem):
         return (cage.x - land_x) / self.clearance, (cage.y - land_y) / self.clearance
 
     def check_speeds(self, speeds: np.ndarray, name: str) -> None:
-        if not self.over_angle or not is_concrete(*jax.tree.leaves(self)):
+        if not is_concrete(*jax.tree.leaves(self)):
             return
         outer = float(self.outer_speed)
         for speed in np.unique(speeds):
@@ -226,7 +218,7 @@ class BearingModel(AbstractForcedSystem):
                     name,
                     said=f"must make the cage turn at {SLOWEST_CAGE:g} of the faster ring's speed at least, "
                     f"{SLOWEST_CAGE * fastest:.3g} rad/s, but with the outer ring at {outer:.6g} rad/s {speed:.6g} "
-                    f"rad/s of the shaft make it {rolling:.3g} rad/s: `bearing_over_time` follows it over time.",
+                    f"rad/s of the shaft make it {rolling:.3g} rad/s.",
                 )
             if abs(rolling) * float(self.land_radius) > FASTEST:
                 land = abs(rolling) * float(self.land_radius)
@@ -253,6 +245,18 @@ class BearingModel(AbstractForcedSystem):
         """Eccentricity ratio of the cage in its land."""
         return jnp.hypot(*self.centre(y))
 
+    def slowness(self, speed: Scalar) -> Array:
+        """Number of a loaded roller's periods in a sixteenth of a revolution over `PERIODS`, 1 to `SLOWEST`."""
+        scale = state_scale(self, speed)
+        turned = PERIODS * TURN * scale.rollers[2, 0] / scale.rollers[3, 0] * jnp.abs(self.rolling_cage_speed(speed))
+        return jnp.clip(SPACING / turned, 1.0, SLOWEST)
+
+    def roller_history(self, run: Any) -> RollerHistory:
+        return roller_history(self, run)
+
+    def known_orders(self, run: Any) -> dict[str, float]:
+        return bearing_orders(self, run)
+
     def comparable(self, speed: float) -> float:
         """Angle of the cage [rad] over which two runs can be compared.
 
@@ -260,8 +264,14 @@ class BearingModel(AbstractForcedSystem):
         vibration on its raceway (NU2310 below 4000 rpm), 10 such periods: neighbouring motions diverge over time, not
         over revolutions.
         """
-        slow = float(slowness(*map(np.asarray, _vibration(self, jnp.asarray(speed)))))
+        slow = float(_slowness(self, jnp.asarray(speed)))
         return COMPARED / PERIODS * SPACING / slow if slow > 1 else SPACING
+
+    def first_state(self, start: Any) -> tuple[np.ndarray, np.ndarray]:
+        row, beside = super().first_state(getattr(start, "row", start))
+        if isinstance(start, BearingState):
+            beside[:2] = np.asarray(start.clock)
+        return row, beside
 
     def at_speed(self, speed: Scalar) -> BearingAtSpeed:
         """The equations of motion at the shaft speed `speed` [rad/s]."""
@@ -279,9 +289,7 @@ class BearingModel(AbstractForcedSystem):
         return BearingAtSpeed(
             n_rollers=bearing.n_rollers,
             held=self.cage_rotation == "held",
-            settles=self.ring.ring_motion == "quasi_static",
             inner_guided=self.guidance == "inner",
-            over_angle=self.over_angle,
             speed=speed,
             outer_speed=self.outer_speed,
             outer_race=RacewayConstants(half, self.outer_radius, self.outer_speed, *shared),
@@ -311,36 +319,14 @@ class BearingModel(AbstractForcedSystem):
         )
 
 
-def slowness(depth: Any, radial: Any, cage_speed: Any) -> Any:
-    """Number of a loaded roller's periods in a sixteenth of a revolution over `PERIODS`, 1 to `SLOWEST`.
-
-    **Arguments:** magnitudes of a roller's depth in its raceway [m] and its radial speed [m/s]; cage speed [rad/s]:
-    numbers, or NumPy arrays of lanes.
-    """
-    turned = PERIODS * TURN * depth / radial * np.abs(cage_speed)
-    return np.clip(SPACING / turned, 1.0, SLOWEST)
-
-
 @compiled
-def _vibration(model: BearingModel, speed: Scalar) -> tuple[Array, Array, Array]:
-    scale = state_scale(model, speed).row
-    return scale[2], scale[3], model.rolling_cage_speed(speed)
+def _slowness(model: BearingModel, speed: Scalar) -> Array:
+    return model.slowness(speed)
 
 
 @compiled
 def _starts(model: BearingModel, speed: Scalar) -> Array:
     return jax.vmap(lambda place: rolling_start(model, speed, place=place).row)(jnp.array(CAGE_STARTS))
-
-
-class BearingOverTime(BearingModel):
-    """A whole bearing whose independent variable is time [s], for starting, coasting and free flight."""
-
-    over_angle: ClassVar[bool] = False
-
-    @classmethod
-    def of(cls, model: BearingModel) -> "BearingOverTime":
-        """The same bearing over time."""
-        return cls(**{field.name: getattr(model, field.name) for field in dataclasses.fields(model)})
 
 
 CagePlace = tuple[float, float, float, float]

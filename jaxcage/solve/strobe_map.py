@@ -6,24 +6,22 @@ once. It is differentiable (forward mode) with respect to state, speed and every
 
 from collections.abc import Sequence
 
+import diffrax as dfx
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Int
 
 from .._arguments import require_x64
-from .._form import split
-from .._types import Scalar, State
-from ..models import ESCAPE, AbstractField, AbstractForcedSystem, require_speeds
-from .kernel import REVOLUTION, Pieces, can_be_kernel, steps_through
+from .._pytrees import Scalar, State, split
+from ..models import AbstractField, AbstractForcedSystem, require_speeds
+from .kernel import REVOLUTION, Pieces, steps_through
 from .method import (
-    DEFAULT_SOLVER,
-    DEFAULT_STEPS,
     AbstractMethod,
     FixedSteps,
     Moved,
     Stretch,
     Tangents,
-    make_fixed,
+    method as method_of,
     moved_by,
     result_at,
 )
@@ -56,7 +54,7 @@ def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMeth
     """
     require_x64()
     require_speeds(system, speed)
-    chosen = make_fixed(DEFAULT_SOLVER, DEFAULT_STEPS) if method is None else method
+    chosen = method_of() if method is None else method
     speed = jnp.asarray(speed, dtype=float)
     return StrobeMap(system.at_speed(speed), system, system.scale(speed), chosen)
 
@@ -72,10 +70,10 @@ def pushed(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Dri
     field's numbers, None where there are none.
     """
     method = strobe.method
-    if isinstance(method, FixedSteps) and can_be_kernel(method.solver):
+    if isinstance(method, FixedSteps):
         pieces = Pieces(strobe.field, strobe.system, strobe.scale)
-        y, peak, result, after = steps_through(method.solver, method.steps, pieces, y, tangents, drifts)
-        return Moved(y, after, peak, outcome_code(result_at(result, y, peak, ESCAPE)))
+        y, peak, after = steps_through(method.solver, method.steps, pieces, y, tangents, drifts)
+        return Moved(y, after, peak, outcome_code(result_at(dfx.RESULTS.successful, y, peak)))
     form, row = split(strobe.field, eqx.is_inexact_array)
 
     def advance(start: tuple[State, list[Array]]) -> Stretch:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._types import Scalar
+from .._pytrees import Scalar
 
 
 class Rollers(NamedTuple):
@@ -119,7 +119,7 @@ BESIDE = ("angle", "time", *INTEGRATED)
 """Quantities that are integrated beside the state: the cage's angle [rad], time [s], and the integrals over time."""
 WATCHED = ("lost", "pocket_force", "land_force", "roller_slip", "eccentricity")
 """Quantities whose largest values are recorded. The first is the eccentricity ratio, or `LOST` where the cage hardly
-turns or a quasi-static ring is out of balance; then a pocket force [N], the whole force of the land on the cage [N],
+turns; then a pocket force [N], the whole force of the land on the cage [N],
 the slip of a roller's spin against pure rolling, and the eccentricity ratio."""
 LOST = 3.0
 

@@ -1,4 +1,4 @@
-"""Slopes of statistics by parameters of the design, with standard errors.
+"""Slopes of statistics by parameters of the design, with standard errors, and tolerance budgets.
 
 Designs are scattered around the given one and run from the same initial states. They come in pairs that mirror each
 other: half the difference of a pair holds no curvature, and least squares over all pairs gives the slopes, with errors
@@ -13,12 +13,12 @@ import numpy as np
 from jaxtyping import Float
 
 from .._arguments import require_at_least
-from .._errors import ArgumentError
-from .._notebook import notebook_html
+from .._errors import ArgumentError, InputError
 from .._parameters import parameters, replace
 from ..models import AbstractForcedSystem
-from .objective import AbstractObjective
-from .statistics import STATISTICS, Runs, statistics_of
+from ..orbits import Sensitivity
+from ..quantities import notebook_html
+from .statistics import STATISTICS, Runs, Statistic, statistics_of
 
 
 DIRECTIONS = (
@@ -51,15 +51,10 @@ class StatisticGradient:
     directions: tuple[str, ...]
     by_relative_change: Float[np.ndarray, " n"]
     """Derivative of the value by the logarithm of each parameter [unit]."""
-    covariance: Float[np.ndarray, "n n"]
-    """Covariance of those derivatives."""
+    by_relative_change_error: Float[np.ndarray, " n"]
+    """Standard error of each derivative."""
     explained: float
     """Share of the scatter of the pairs that the slopes explain, 0 to 1."""
-
-    @property
-    def by_relative_change_error(self) -> Float[np.ndarray, " n"]:
-        """Standard error of each derivative."""
-        return np.sqrt(np.diag(self.covariance))
 
     @property
     def elasticity(self) -> Float[np.ndarray, " n"]:
@@ -91,19 +86,13 @@ class MeanGradient:
     """Number of designs that failed, and are left out with their partners."""
     inaccurate: int
     """Number of lanes that are `inaccurate`, which count."""
-    spread: float
-    runs: Runs
 
     def slope(self, statistic: str, parameter: str) -> tuple[float, float]:
         """Derivative by one parameter that changes alone [unit of the statistic per SI unit], with its standard error.
 
-        **Raises:** `ValueError` for a statistic or parameter that is not there.
+        **Raises:** `ValueError` for a parameter that does not change alone.
         """
-        found = self.statistics.get(statistic)
-        if found is None:
-            raise ArgumentError(
-                "statistic", said=f"must be one of {', '.join(self.statistics)}, but '{statistic}' was given."
-            )
+        found = self.statistics[statistic]
         alone = [name for name in found.directions if "+" not in name]
         if parameter not in alone:
             raise ArgumentError("parameter", said=f"must be one of {', '.join(alone)}, but '{parameter}' was given.")
@@ -111,8 +100,7 @@ class MeanGradient:
         return float(found.by_relative_change[i] / value), float(found.by_relative_change_error[i] / abs(value))
 
     def __str__(self) -> str:
-        rpm = ", ".join(f"{speed * 30 / math.pi:.0f}" for speed in self.runs.speed.tolist())
-        lines = [f"{rpm} rpm, elasticities from {self.pairs} pairs of designs"]
+        lines = [f"Elasticities from {self.pairs} pairs of designs"]
         for each in self.statistics.values():
             lines.append(f"{each.name} {each.value:.4g} +- {each.value_error:.2g} {each.unit}")
             rows = zip(each.directions, each.elasticity, each.elasticity_error, strict=True)
@@ -125,7 +113,7 @@ class MeanGradient:
 def mean_gradient(
     model: AbstractForcedSystem,
     runs: Runs,
-    statistics: Sequence[str] | Mapping[str, AbstractObjective] = STATISTICS,
+    statistics: Sequence[str] | Mapping[str, Statistic] = STATISTICS,
     *,
     directions: Sequence[str] = DIRECTIONS,
     designs: int = DESIGNS,
@@ -154,37 +142,27 @@ def mean_gradient(
     counts that are impossible, too few designs for the directions; if too many of them fail.
     """
     require_at_least(0, seed=seed)
-    chosen, values = statistics_of(runs, statistics), _values(model, directions)
+    chosen, values = statistics_of(model, statistics), _values(model, directions)
     least = 2 * (len(directions) + 2)
     if designs % 2 or designs < least:
-        raise ArgumentError(
-            "designs", said=f"must be an even number from {least} on, for so many directions, but {designs} was given."
-        )
+        said = f"must be an even number from {least} on, for so many directions, but {designs} was given."
+        raise ArgumentError("designs", said=said)
     if not 0 < spread <= 0.3:
         raise ArgumentError("spread", said=f"must be above 0 and at most 0.3, but {spread:g} was given.")
     moved = spread * _moves(designs // 2, len(directions), seed)
-    boxed = [_design(model, values, directions, row) for row in np.concatenate([moved, -moved])]
-    found = {name: each.samples(boxed).mean(axis=1) for name, each in chosen.items()}
+    changed = lambda row: {n: values[n] * (1 + by) for d, by in zip(directions, row) for n in d.split("+")}
+    boxed = [replace(model, **changed(row)) for row in np.concatenate([moved, -moved]).tolist()]
+    swept = runs.run(boxed)
+    found = {name: each.samples(boxed, swept).mean(axis=(1, 2)) for name, each in chosen.items()}
     failed = ~np.all([np.isfinite(blocks).all(axis=1) for blocks in found.values()], axis=0)
     whole = ~failed.reshape(2, -1).any(axis=0)
     if whole.sum() <= len(directions) + 1:
-        raise ArgumentError(
-            "designs",
-            said=f"must be more: only {whole.sum()} pairs came to their ends, for {len(directions)} slopes.",
-        )
-    paired = {name: blocks.reshape(2, designs // 2, -1)[:, whole] for name, blocks in found.items()}
-    return MeanGradient(
-        statistics={
-            name: gradient_of_pairs(name, each.unit(model), tuple(directions), moved[whole], paired[name])
-            for name, each in chosen.items()
-        },
-        values=values,
-        pairs=int(whole.sum()),
-        failed=int(failed.sum()),
-        inaccurate=int((runs.run(boxed)["outcome"] == "inaccurate").sum()),
-        spread=spread,
-        runs=runs,
-    )
+        said = f"must be more: only {whole.sum()} pairs came to their ends, for {len(directions)} slopes."
+        raise ArgumentError("designs", said=said)
+    pairs = {name: blocks.reshape(2, designs // 2, -1)[:, whole] for name, blocks in found.items()}
+    about = int(whole.sum()), int(failed.sum()), int((swept["outcome"] == "inaccurate").sum())
+    fit = lambda name: gradient_of_pairs(name, chosen[name].unit, tuple(directions), moved[whole], pairs[name])
+    return MeanGradient({name: fit(name) for name in chosen}, values, *about)
 
 
 def _values(model: AbstractForcedSystem, directions: Sequence[str]) -> dict[str, float]:
@@ -195,9 +173,8 @@ def _values(model: AbstractForcedSystem, directions: Sequence[str]) -> dict[str,
         raise ArgumentError("directions", said="must hold at least one parameter, but it is empty.")
     for name in names:
         if name not in known or not float(known[name]):
-            raise ArgumentError(
-                "directions", said=f"must hold parameters of the design that are not 0, but has '{name}'."
-            )
+            said = f"must hold parameters of the design that are not 0, but has '{name}'."
+            raise ArgumentError("directions", said=said)
         if names.count(name) > 1:
             raise ArgumentError("directions", said=f"must name each parameter once, but has '{name}' twice.")
     return {name: float(known[name]) for name in names}
@@ -210,17 +187,6 @@ def _moves(pairs: int, directions: int, seed: int) -> Float[np.ndarray, "pairs d
         found = np.stack([rng.permutation(even) * rng.uniform(0.5, 1.0, pairs) for _ in range(directions)], axis=-1)
         if np.linalg.matrix_rank(found) == directions:
             return found
-
-
-def _design(
-    model: AbstractForcedSystem,
-    values: dict[str, float],
-    directions: Sequence[str],
-    moved: Float[np.ndarray, " n"],
-) -> AbstractForcedSystem:
-    """The design with all its directions moved by relative changes."""
-    shares = zip(directions, moved.tolist(), strict=True)
-    return replace(model, **{n: values[n] * (1 + share) for each, share in shares for n in each.split("+")})
 
 
 def gradient_of_pairs(
@@ -242,19 +208,65 @@ def gradient_of_pairs(
     inverse = np.linalg.inv(moved.T @ moved)
     slopes = inverse @ moved.T @ half
     left = half - moved @ slopes
-    weight = left / (1 - np.einsum("ij,jk,ik->i", moved, inverse, moved))  # HC3
     bread = inverse @ moved.T
+    weight = left / (1 - np.einsum("ij,ji->i", moved, bread))  # HC3
+    slope_error = np.sqrt((bread**2) @ weight**2)
     total = float(np.sum(half * half))
     error = lambda x: float(np.std(x, ddof=1) / math.sqrt(len(half)))
-    return StatisticGradient(
-        name=name,
-        unit=unit,
-        value=float(middle.mean()),
-        value_error=error(middle),
-        drift=float(drift.mean()),
-        drift_error=error(drift),
-        directions=directions,
-        by_relative_change=slopes,
-        covariance=(bread * weight**2) @ bread.T,
-        explained=1 - float(np.sum(left * left)) / total if total > 0 else math.nan,
-    )
+    means = float(middle.mean()), error(middle), float(drift.mean()), error(drift)
+    explained = 1 - float(np.sum(left * left)) / total if total > 0 else math.nan
+    return StatisticGradient(name, unit, *means, directions, slopes, slope_error, explained)
+
+
+@dataclasses.dataclass(frozen=True)
+class ToleranceBudget:
+    """Scatter of an edge or a statistic that the scatter of parameters causes, to first order."""
+
+    name: str
+    unit: str
+    value: float
+    deviation: dict[str, float]
+    """Standard deviation due to each parameter, or several that change together, alone [unit]."""
+    error: dict[str, float]
+    """Standard error of each; 0 of an exact edge."""
+
+    @property
+    def total(self) -> float:
+        """Standard deviation due to all of them, taken as independent."""
+        return math.hypot(*self.deviation.values())
+
+    @property
+    def unclear(self) -> tuple[str, ...]:
+        """Parameters whose deviation has an error, and is within twice of it."""
+        return tuple(name for name, x in self.deviation.items() if x <= 2 * self.error[name] > 0)
+
+    def __str__(self) -> str:
+        order = sorted(self.deviation.items(), key=lambda item: -item[1])
+        total = self.total or 1.0  # without any scatter, nothing is a part of it
+        rows = [f"  {n:<24} +-{d:.3g} {self.unit}, {100 * (d / total) ** 2:.0f} % of the variance" for n, d in order]
+        return "\n".join(
+            [f"{self.name} {self.value:.6g} {self.unit}: +-{1.96 * self.total:.3g} {self.unit} (95 %)", *rows]
+        )
+
+
+def tolerance_budget(of: Sensitivity | StatisticGradient, deviation: Mapping[str, float]) -> ToleranceBudget:
+    """Scatter of an edge from its exact derivatives, or of a statistic from its slopes.
+
+    **Arguments:** edge or statistic; standard deviation of each parameter relative to its value (a tolerance of +-t,
+    evenly used, has t/sqrt(3)).
+
+    **Raises:** `ValueError` for a parameter without a derivative, or a negative deviation.
+    """
+    if isinstance(of, StatisticGradient):
+        value, unit, each = of.value, of.unit, zip(of.by_relative_change, of.by_relative_change_error, strict=True)
+        slopes = dict(zip(of.directions, each, strict=True))
+    else:
+        value, unit = of.value_rpm, "rpm"
+        slopes = {name: (elasticity * value, 0.0) for name, elasticity in of.elasticity.items()}
+    for name, d in deviation.items():
+        if name not in slopes:
+            raise InputError(f"Tolerance of `{name}` must be of one of {', '.join(slopes)}.")
+        if not d >= 0:
+            raise InputError(f"Tolerance of `{name}` must not be negative, but {d} was given.")
+    by, error = ({n: float(abs(slopes[n][k]) * d) for n, d in deviation.items()} for k in (0, 1))
+    return ToleranceBudget(of.name, unit, value, by, error)

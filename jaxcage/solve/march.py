@@ -3,8 +3,8 @@
 A step is written for a single lane, on scalars. What surrounds it decides what becomes of it:
 - `jax.vmap` makes lanes of it, and numbers that are the same in every lane stay scalars;
 - `jax.jvp` and `jax.jacfwd` put tangent vectors into the step, to any order; several directions share its values;
-- on a CPU it is machine code (`ir`) that JAX's program calls (`call`): a few microseconds, and no compilation by XLA;
-  elsewhere, and for a step with an operation that has no translation, it is the same loop inside JAX.
+- on a CPU it is machine code (`ir`) that JAX's program calls (`xla_call`): a few microseconds, and no compilation by
+  XLA; elsewhere, and for a step with an operation that has no translation, it is the same loop inside JAX.
 
 Reverse mode is had by columns: a Jacobian matrix in forward mode, transposed (`orbits.newton.by_columns`).
 """
@@ -23,9 +23,9 @@ from jax.core import Tracer
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Int
 
-from .call import UnknownInterface, handler_ir, registered
 from .ir import UnknownOperation, Value, Writer, number, say_once
 from .program import CONTROL_FLOW, Numbers, Sizes, Step, program_of
+from .xla_call import UnknownInterface, handler_ir, registered
 
 
 WIDTH = 8

@@ -1,4 +1,4 @@
-"""Edges of lasting chaos that no bifurcation explains, with their gradients and error bars.
+"""Edges of lasting chaos that no bifurcation explains, with their gradients and error bars, and widths of zones.
 
 At such an edge the mean life of chaos passes the horizon. It is never differentiated along a chaotic trajectory: many
 lanes, each at its own speed and of its own design near the edge, leave chaos at a rate whose logarithm is linear in
@@ -7,7 +7,7 @@ speed and parameters; the edge is where that rate is one escape in a horizon, an
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
@@ -16,11 +16,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._errors import ArgumentError
-from .._notebook import notebook_html
 from .._parameters import parameters, replace
 from ..analysis import LIFE_BLOCK, Hazard, Zone, hazard
 from ..lanes import Plan, Progress, Run, run_lanes
 from ..models import CageModel
+from ..orbits import Sensitivity
+from ..quantities import notebook_html
 from ..solve import AbstractMethod
 
 
@@ -29,7 +30,7 @@ DESIGNS = 64
 ROUNDS = 4
 """Times that lanes are spread, about the edge as it is known by then."""
 SPREAD = 0.02
-"""Relative standard deviation of the parameters."""
+"""Relative standard deviation of the parameters among the lanes."""
 REACH = 2.0
 """Lanes are spread over speeds with mean lives of e^-REACH to e^REACH horizons, as far as the last round tells."""
 DISCARD, OBSERVED = 100, 300
@@ -50,11 +51,8 @@ class LastingEdge:
     """Relative change of the edge by that of each parameter."""
     covariance: Float[np.ndarray, "1+n 1+n"]
     """Covariance of the speed [rpm] and the elasticities."""
-    values: Float[np.ndarray, " n"]
-    """Parameters [SI]."""
     horizon: int
-    middle_rpm: float
-    window_rpm: float
+    window_rpm: tuple[float, float]
     """Middle and half width of the speeds of the last round."""
     steepness: float
     """Change of the logarithm of the escape rate with speed [1/rpm]."""
@@ -63,15 +61,10 @@ class LastingEdge:
     @property
     def status(self) -> str:
         """`converged`, or why the numbers should not be used."""
-        away = abs(self.speed_rpm - self.middle_rpm)
-        if not max(away, CERTAIN * self.standard_error_rpm) < self.window_rpm:
+        middle, half = self.window_rpm
+        if not max(abs(self.speed_rpm - middle), CERTAIN * self.standard_error_rpm) < half:
             return "no edge: the mean life does not pass the horizon among these speeds"
         return "converged" if self.fit.p_value >= LIKELY else "the rate of escapes is not log-linear here"
-
-    @property
-    def slope(self) -> Float[np.ndarray, " n"]:
-        """[rpm per unit of the parameter]."""
-        return self.elasticity * self.speed_rpm / self.values
 
     @property
     def standard_error_rpm(self) -> float:
@@ -111,8 +104,6 @@ def lasting_edge(
     names: Sequence[str] = NAMES,
     designs: int = DESIGNS,
     horizon: int = 3000,
-    rounds: int = ROUNDS,
-    spread: float = SPREAD,
     seed: int = 0,
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
@@ -124,10 +115,8 @@ def lasting_edge(
     - `model`: the design.
     - `rpm`, `within_rpm`: speed of the edge and its uncertainty, as a sweep gives them.
     - `names`: parameters; each costs no more, but all answers become less certain.
-    - `designs`: designs of each round, each at a speed of its own, from all starts of the model.
+    - `designs`: designs of each of four rounds, each at a speed of its own, from all starts of the model.
     - `horizon`: mean life of chaos at the edge [revolutions].
-    - `rounds`: times that lanes are spread about the edge as it is known by then; all rounds count in the end.
-    - `spread`: relative standard deviation of the parameters among the lanes.
     - `seed`: seed of the draws; `method`, `progress`: as in `sweep`.
 
     **Returns:** `LastingEdge`; its `status` says where the numbers should not be used.
@@ -149,31 +138,28 @@ def lasting_edge(
     elasticity = np.zeros(len(names))
     speed, change, times = np.empty(0), np.empty((0, len(names))), np.empty(0)
     found = None
-    for _ in range(rounds):
-        moved = rng.normal(size=(designs, len(names))).clip(-2, 2) * spread
+    for _ in range(ROUNDS):  # all rounds count in the end
+        moved = rng.normal(size=(designs, len(names))).clip(-2, 2) * SPREAD
         at = (edge + window * rng.uniform(-1, 1, designs)) * (1 + moved @ elasticity)
         new, end = _escapes(model, names, base * (1 + moved), at, horizon, method, progress)
         each = new.shape[1]
         speed, times = np.append(speed, np.repeat(at, each)), np.append(times, new)
         change = np.vstack([change, np.repeat(moved, each, axis=0)])
-        found = _fitted(speed, change, times, edge, window, end, names, base)
+        found = _fitted(speed, change, times, (edge, window), end, tuple(names))
         edge, elasticity = edge + float(np.clip(found.speed_rpm - edge, -window, window)), found.elasticity
         window = float(np.clip(REACH / max(abs(found.steepness), 1e-12), window / 2, 2 * window))
     assert found is not None
     return found
 
 
-def lasting_edges(model: CageModel, zone: Zone, **options: Any) -> dict[str, LastingEdge]:
+def lasting_edges(model: CageModel, zone: Zone, **options: object) -> dict[str, LastingEdge]:
     """Edges of a zone of lasting chaos: `onset`, `exit`, or one of them where it is open.
 
     **Arguments:** the design; one of `jaxcage.zones`; options of `lasting_edge`.
     """
-    ends = {end: getattr(zone, end) for end in ("onset", "exit")}
-    return {
-        end: lasting_edge(model, edge.speed_rpm, edge.uncertainty_rpm, **options)
-        for end, edge in ends.items()
-        if edge is not None
-    }
+    ends = {"onset": zone.onset, "exit": zone.exit}
+    solve: Any = lasting_edge
+    return {end: solve(model, e.speed_rpm, e.uncertainty_rpm, **options) for end, e in ends.items() if e is not None}
 
 
 def _escapes(
@@ -197,14 +183,13 @@ def _fitted(
     rpm: np.ndarray,
     change: np.ndarray,
     times: np.ndarray,
-    edge: float,
-    window: float,
+    about: tuple[float, float],
     horizon: int,
-    names: Sequence[str],
-    base: np.ndarray,
+    names: tuple[str, ...],
 ) -> LastingEdge:
     """The edge by a law of escapes whose logarithm is a square of the speed, or linear where that is not steep."""
     scale = np.maximum(np.std(change, axis=0), 1e-12)
+    edge, window = about
     u = (rpm - edge) / window
 
     def solved(beta: Array) -> tuple[Array, Array]:
@@ -224,5 +209,81 @@ def _fitted(
             break
     speed, *elasticity = np.asarray(found).tolist()
     covariance = np.asarray(jacobian) @ fit.covariance @ np.asarray(jacobian).T
-    about = (base, horizon, edge, window, float(steep) / window, fit)
-    return LastingEdge(speed, tuple(names), np.array(elasticity), covariance, *about)
+    return LastingEdge(speed, names, np.array(elasticity), covariance, horizon, about, float(steep) / window, fit)
+
+
+SolvedEdge = LastingEdge | Sensitivity
+"""An edge with its elasticities: by survival regression, or exact."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ZoneWidth:
+    """Width of a zone, of lasting chaos or of synchronous loss, and its change with parameters.
+
+    Each edge has an error of its own; the gradient of an exact edge has none. A zone that is cut by the range is open:
+    it has no width, but its gradient is that of the other edge.
+    """
+
+    onset: SolvedEdge | None
+    exit: SolvedEdge | None
+    """None where the zone goes on beyond the range."""
+
+    @property
+    def open(self) -> bool:
+        """True if the range cuts it."""
+        return self.onset is None or self.exit is None
+
+    @property
+    def trusted(self) -> bool:
+        """True if all edges that it has are converged."""
+        return all(edge is None or edge.status == "converged" for edge in (self.onset, self.exit))
+
+    @property
+    def status(self) -> str:
+        """`converged`, `open: ...`, or which edge should not be used, and why."""
+        ends = {"onset": self.onset, "exit": self.exit}
+        bad = [f"{name}: {edge.status}" for name, edge in ends.items() if edge and edge.status != "converged"]
+        missing = [f"open: no {name} within the range" for name, edge in ends.items() if edge is None]
+        return "; ".join([*missing, *bad]) or "converged"
+
+    @property
+    def width_rpm(self) -> float | None:
+        """Exit less onset; None for an open zone."""
+        return None if self.open else sum(speed for speed, *_ in self._ends())
+
+    @property
+    def standard_error_rpm(self) -> float | None:
+        """Standard error of the width; for an exact edge its distance to that by half the steps counts."""
+        return None if self.open else math.hypot(*(error for _, error, _ in self._ends()))
+
+    def change(self, *names: str) -> tuple[float, float]:
+        """Change of the width when parameters grow together [rpm by their relative change], with its standard error;
+        for an open zone that of its one edge."""
+        found = [(speed, *edge(names)) for speed, _, edge in self._ends()]
+        return sum(by * e for by, e, _ in found), math.hypot(*(by * error for by, _, error in found))
+
+    def _ends(self) -> list[tuple[float, float, Any]]:
+        """Speed, negative for the onset, its error, and the function that sums elasticities, of each edge."""
+        ends = [(-1.0, self.onset), (1.0, self.exit)]
+        exact = lambda edge: lambda names: (sum(edge.elasticity[n] for n in names), 0.0)
+        return [
+            (sign * edge.value_rpm, edge.error_rpm, exact(edge))
+            if isinstance(edge, Sensitivity)
+            else (sign * edge.speed_rpm, edge.standard_error_rpm, lambda names, edge=edge: edge.sum_of(*names))
+            for sign, edge in ends
+            if edge is not None
+        ]
+
+
+def zone_width(edges: Mapping[str, SolvedEdge], zone: int = 1) -> ZoneWidth:
+    """Width of a zone, exit less onset [rpm], and its change with the design, with standard errors.
+
+    **Arguments:** edges by name, `zone 1 onset` and the like, as `jaxcage.orbits.sensitivities` has them, or `onset`
+    and `exit`, as `lasting_edges` does; number of the zone.
+
+    **Raises:** `ValueError` for a zone of which no edge is known.
+    """
+    ends = [edges.get(f"zone {zone} {end}", edges.get(end)) for end in ("onset", "exit")]
+    if not any(ends):
+        raise ArgumentError("zone", said=f"must be one with an edge among {', '.join(edges)}, but is {zone}.")
+    return ZoneWidth(*ends)

@@ -1,14 +1,23 @@
-"""Pytrees taken apart into their arrays and the rest, and functions compiled by it."""
+"""Types of the arrays in public signatures (jaxtyping; checked at run time in the tests only), and pytrees taken apart
+into their arrays and the rest."""
 
 import functools
 import gc
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
 import jax
 import numpy as np
+from jaxtyping import Array, Float
 
+
+Scalar: TypeAlias = Float[Array, ""] | float | int
+"""A real number: a zero-dimensional array (traced or not) or a Python number."""
+
+State: TypeAlias = tuple[Float[Array, "..."] | float | int, ...]
+"""Coordinates, velocities or a whole state as a tuple of scalars, so that lanes stay innermost under `vmap`; of a whole
+bearing two arrays, the state and the quantities beside it."""
 
 ARRAYS = (jax.Array, np.ndarray, np.generic)
 

@@ -9,7 +9,6 @@ import functools
 import pathlib
 import re
 import threading
-from typing import Any
 
 import jax
 

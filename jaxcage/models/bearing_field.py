@@ -1,6 +1,6 @@
 """Equations of motion of the whole bearing at one shaft speed.
 
-The independent variable is the cage's angle, or time. Rollers are an axis of arrays. Each contact is computed once, and
+The independent variable is the cage's angle. Rollers are an axis of arrays. Each contact is computed once, and
 both bodies get the same numbers of it: forces and moments inside the bearing cancel to rounding. Rates of the
 rollers contain the cage's speed, but not its acceleration: rollers are coupled only through cage and inner ring.
 
@@ -17,8 +17,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._types import Scalar, State
+from .._pytrees import Scalar, State
 from ..forces import cos_sin
+from .bearing_states import LOST, BearingState, Bodies, Rates, Rollers, bodies_of, rollers_of
 from .contacts import (
     Guide,
     LandForces,
@@ -34,18 +35,13 @@ from .contacts import (
     quadratic,
 )
 from .field import AbstractField, AbstractLinearisation
-from .whole_states import LOST, BearingState, Bodies, Rates, Rollers, bodies_of, rollers_of
 
 
 Many = Float[Array, "*rollers"] | float | int
 """A number of all rollers, or of one."""
 
-NEWTON_STEPS, LONGEST_STEP = 8, 1e-3
-"""Iterations for the place of a quasi-static ring, and the longest change in each, over the roller's radius."""
 STALLED = 0.05
 """Speed of the cage over that of pure rolling below which its angle is no measure of progress."""
-IMBALANCE = 1e-6
-"""Largest force by which a quasi-static ring may be out of balance, as a fraction of load and weight."""
 
 
 class Geometry(NamedTuple):
@@ -116,11 +112,7 @@ class BearingAtSpeed(AbstractField):
 
     n_rollers: int = eqx.field(static=True)
     held: bool = eqx.field(static=True)
-    settles: bool = eqx.field(static=True)
-    """True if the inner ring is quasi-static."""
     inner_guided: bool = eqx.field(static=True)
-    over_angle: bool = eqx.field(static=True)
-    """True if the independent variable is the cage's angle, counted in its sense; false if it is time."""
     speed: Scalar
     """Speed of the inner ring [rad/s]."""
     outer_speed: Scalar
@@ -146,34 +138,19 @@ class BearingAtSpeed(AbstractField):
         """Rates of a row of the state at the cage's angle `tau`."""
         clock = jnp.stack([jnp.asarray(tau, dtype=float), jnp.zeros(())])
         row = jnp.stack([jnp.asarray(c, dtype=float) for c in y])
-        rates, *_ = self.rates_beside(row, clock)
-        return tuple(rates)
+        rates = self.rates(BearingState(rollers_of(row), bodies_of(row), clock)).state
+        return tuple(self.pace(rates.clock[0]) * rates.row)
 
     def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
-        raise NotImplementedError("A whole bearing has no linearisation: take an implicit method of diffrax.")
-
-    def rates_beside(
-        self, row: Float[Array, " dim"], beside: Float[Array, " beside"]
-    ) -> tuple[Float[Array, " dim"], Float[Array, " beside"], Float[Array, " watched"]]:
-        """Rates of the state and of the quantities beside it over the independent variable, and what is watched."""
-        rates = self.rates(self.settled(BearingState(rollers_of(row), bodies_of(row), beside[:2])))
-        pace = self.pace(rates.state.clock[0])
-        return pace * rates.state.row, pace * jnp.concatenate([rates.state.clock, rates.integrals]), rates.watched
-
-    def settled_row(
-        self, row: Float[Array, " dim"], beside: Float[Array, " beside"]
-    ) -> tuple[Float[Array, " dim"], Float[Array, " beside"]]:
-        """A state and the quantities beside it with a quasi-static inner ring in its place."""
-        return self.settled(BearingState(rollers_of(row), bodies_of(row), beside[:2])).row, beside
+        raise NotImplementedError("A whole bearing has no linearisation: its methods are explicit.")
 
     def pace(self, cage_speed: Scalar) -> Scalar:
-        """Factor from rates over time to rates over the independent variable."""
-        return 1 / jnp.abs(cage_speed) if self.over_angle else 1.0
+        """Factor from rates over time to rates over the cage's angle, counted in its sense."""
+        return 1 / jnp.abs(cage_speed)
 
     def lost(self, cage_speed: Scalar, eps: Scalar) -> Array:
         """The eccentricity ratio, or `LOST` where the cage turns too slowly for its angle to measure progress."""
-        slowest = STALLED * jnp.abs(self.rolling_cage_speed) if self.over_angle else 0.0
-        return jnp.where(jnp.abs(cage_speed) < slowest, LOST, eps)
+        return jnp.where(jnp.abs(cage_speed) < STALLED * jnp.abs(self.rolling_cage_speed), LOST, eps)
 
     @property
     def places(self) -> np.ndarray:
@@ -242,51 +219,16 @@ class BearingAtSpeed(AbstractField):
         distance = jnp.sqrt(out * out + across * across)
         return Geometry(pocket_cos, pocket_sin, lag_cos, lag_sin, c, s, distance, out / distance, across / distance)
 
-    def settled(self, state: BearingState) -> BearingState:
-        """The state with a quasi-static inner ring at rest where the contacts carry load and weight.
-
-        Newton's method starts from the ring's place; its velocity enters no contact. A dynamic ring stays as it is.
-        """
-        if not self.settles:
-            return state
-        at_rest = state.bodies.at[7:9].set(0.0)
-        placed = lambda place: state._replace(bodies=at_rest.at[5:7].set(place))
-        little = jnp.eye(2) * self.load / self.inner_race.half  # where no contact is left to hold it
-
-        def better(_: Array, place: Array) -> Array:
-            push = lambda p: self._on_ring(placed(p))
-            (xx, xy), (yx, yy) = -jax.jacfwd(push)(place) + little
-            fx, fy = push(place)
-            step = jnp.stack([yy * fx - xy * fy, xx * fy - yx * fx]) / (xx * yy - xy * yx)
-            most = LONGEST_STEP * self.inner_race.half
-            return place + step * jnp.minimum(1.0, most / jnp.sqrt(jnp.sum(step * step) + 1e-30))
-
-        return placed(jax.lax.fori_loop(0, NEWTON_STEPS, better, state.bodies[5:7]))
-
-    def _on_ring(self, state: BearingState) -> Array:
-        """All forces on the inner ring [N]."""
-        f, ring = self.forces(state), Bodies(*state.bodies)
-        g, inner = f.geometry, f.inner
-        out = inner.load * g.inner_out - inner.traction * g.inner_across
-        across = inner.load * g.inner_across + inner.traction * g.inner_out
-        x = -jnp.sum(out * g.cos - across * g.sin) - self.mounting_damping * ring.ring_vx
-        y = -jnp.sum(out * g.sin + across * g.cos) - self.mounting_damping * ring.ring_vy
-        if self.inner_guided:
-            land = self.on_land(ring)
-            x, y = x - land.x, y - land.y
-        return jnp.stack([x, y - self.load - self.ring_mass * self.gravity])
-
     def rates(self, state: BearingState) -> Rates:
-        """Rates over time; a quasi-static ring has to be `settled`."""
+        """Rates over time."""
         f, rollers, cage = self.forces(state), Rollers(*state.rollers), Bodies(*state.bodies)
         assert f.land is not None
         alone = f._replace(land=None)
         roller_rates, passed = jax.vmap(self.roller_rates, in_axes=(0, None, 0))(rollers, cage, alone)
         sums = Passed(*jnp.sum(jnp.stack(passed), axis=1))
-        body_rates, integrals, imbalance = self.body_rates(cage, cos_sin(state.clock[0]), sums, f.land)
+        body_rates, integrals = self.body_rates(cage, cos_sin(state.clock[0]), sums, f.land)
         slip = jnp.max(jax.vmap(self.slip)(rollers.spin))
-        heavy = jnp.abs(self.load) + self.ring_mass * self.gravity
-        lost = jnp.where(imbalance > IMBALANCE * heavy, LOST, self.lost(cage.cage_speed, f.land.eps))
+        lost = self.lost(cage.cage_speed, f.land.eps)
         watched = jnp.stack([lost, jnp.max(f.pocket.normal), f.land.size, slip, f.land.eps])
         clock = jnp.stack([cage.cage_speed, jnp.ones_like(cage.cage_speed)])
         moved = BearingState(jnp.stack(roller_rates), jnp.stack(body_rates), clock)
@@ -336,9 +278,8 @@ class BearingAtSpeed(AbstractField):
 
     def body_rates(
         self, cage: Bodies, phase: tuple[Scalar, Scalar], sums: Passed, land: LandForces
-    ) -> tuple[tuple[Array, ...], tuple[Array, ...], Array]:
-        """Rates of cage and inner ring under the sums over all rollers; rates of the integrals, as in `INTEGRATED`;
-        the force by which a quasi-static ring is out of balance.
+    ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+        """Rates of cage and inner ring under the sums over all rollers; rates of the integrals, as in `INTEGRATED`.
 
         **Arguments:** cosine and sine of the cage's angle; else as they are called.
         """
@@ -361,10 +302,6 @@ class BearingAtSpeed(AbstractField):
         ring_y = -sums.inner_y - self.mounting_damping * cage.ring_vy - (land.y if from_land else 0.0)
         ring_y = ring_y - self.load - self.ring_mass * g
         ring_rates = cage.ring_vx, cage.ring_vy, ring_x / self.ring_mass, ring_y / self.ring_mass
-        imbalance = jnp.zeros_like(ring_x)
-        if self.settles:
-            imbalance = jnp.sqrt(ring_x * ring_x + ring_y * ring_y)
-            ring_rates = (jnp.zeros_like(ring_x),) * 4
         on_inner = -sums.inner_moment + (land.land_moment if from_land else 0.0)
         on_outer = -sums.outer_moment + (0.0 if from_land else land.land_moment)
         mounting = self.mounting_damping * (cage.ring_vx * cage.ring_vx + cage.ring_vy * cage.ring_vy)
@@ -397,4 +334,4 @@ class BearingAtSpeed(AbstractField):
             land.eps * land.eps,
         )
         rates = cage.vx, cage.vy, cage_x, cage_y, turning, *ring_rates
-        return tuple(map(jnp.asarray, rates)), tuple(map(jnp.asarray, integrals)), imbalance
+        return tuple(map(jnp.asarray, rates)), tuple(map(jnp.asarray, integrals))

@@ -1,0 +1,215 @@
+"""Search for a better design within bounds by a Gaussian process, for values that have noise and no slope.
+
+Each design of a batch is the best of one sample drawn from the process (Thompson sampling), among places in a region
+about the best design so far, which grows while designs become better and shrinks while they do not (D. Eriksson et al.,
+Scalable Global Optimization via Local Bayesian Optimization, NeurIPS 2019).
+"""
+
+import dataclasses
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from jaxtyping import Float
+
+from .._arguments import require_at_least, require_x64
+from .._errors import ArgumentError, InputError
+from .._parameters import parameter_paths, parameters, replace
+from ..lanes import sobol
+from ..models import AbstractForcedSystem
+
+
+AT_BOUND = 0.01
+"""Distance from a bound within which a parameter is at the bound, as a part of the bounds' distance."""
+CANDIDATES = 512
+"""Places among which a sample has its best."""
+FIRST, SMALLEST = 0.6, 0.02
+"""Sizes of the region, as parts of the distance between the bounds. One that has become too small begins again."""
+LENGTH, NOISE = 0.7, 0.05
+"""First guess of the process: its correlation length in each parameter, and the variance of its noise."""
+AMONG = 4
+"""Number of the best designs that are compared again at the end."""
+OFFSET = 5e-3
+"""Part of the first value that is added to all of them, so that the logarithm of a small one has no cliff."""
+
+Design = TypeVar("Design", bound=AbstractForcedSystem)
+Models = Sequence[AbstractForcedSystem]
+Bounds = Mapping[str, tuple[float, float]]
+"""Smallest and largest value [SI] by parameter name."""
+Values = Callable[[Models], Float[np.ndarray, " designs"]]
+"""Function that returns the value of each design, to be made small; NaN of a design without a value."""
+Places = Float[np.ndarray, "designs n"]
+"""Parameters of designs as parts of the way from their lower bounds to their upper ones."""
+
+
+def checked_bounds(system: AbstractForcedSystem, vary: Bounds) -> None:
+    """**Raises:** `ValueError` for a parameter that the system does not have, bounds that do not ascend, or none."""
+    if not vary:
+        raise ArgumentError("vary", said="must hold at least one parameter, but it is empty.")
+    known = parameter_paths(system)
+    for name, (low, high) in vary.items():
+        if name not in known:
+            raise InputError(f"`{name}` must be a parameter of the design: {', '.join(known)}.")
+        if not (np.isfinite([low, high]).all() and low < high):
+            raise InputError(f"Bounds of `{name}` must ascend, but {low} and {high} were given.")
+
+
+def designs_at(system: Design, vary: Bounds, places: Places) -> list[Design]:
+    """Designs at places between bounds."""
+    low, high = np.array(list(vary.values())).T
+    rows = (low + places * (high - low)).tolist()
+    return [replace(system, **dict(zip(vary, row, strict=True))) for row in rows]
+
+
+@dataclasses.dataclass(frozen=True)
+class Optimum(Generic[Design]):
+    """The best design of a search."""
+
+    model: Design
+    values: dict[str, float]
+    """Parameters that were varied [SI]."""
+    objective: float
+    at_bound: tuple[str, ...]
+    """Parameters that ended at a bound: there the bound chose, not the objective."""
+    history: tuple[float, ...]
+    """Best value of each batch."""
+    changed: bool
+    """False if the given design stays, because no other was better."""
+
+    def __str__(self) -> str:
+        rows = [f"Optimum after {len(self.history)} batches: {self.objective:.6g}"]
+        rows += [f"  {n:<24} {v:.6g}{' at bound' if n in self.at_bound else ''}" for n, v in self.values.items()]
+        return "\n".join(rows)
+
+
+def surrogate_search(
+    system: Design,
+    vary: Bounds,
+    values: Values,
+    *,
+    confirm: Values | None = None,
+    batches: int = 10,
+    batch: int = 12,
+    seed: int = 0,
+    report: Callable[[int, int], None] | None = None,
+) -> Optimum[Design]:
+    """Make the values of designs small by changing some parameters.
+
+    **Arguments:**
+
+    - `system`: the design; `vary`: bounds [SI] by parameter name, between which the design lies.
+    - `values`: function of a list of designs that returns their values.
+    - `confirm`: the same by other or longer runs. The least of many values with noise is lower than the true value
+        there, so this compares the best few designs and the given one again, and chooses among them.
+    - `batches` of `batch` designs each. The first ones, of twice as many designs as there are parameters and four,
+        lie all over the bounds, and the given design is among them.
+    - `seed`: seed of all that is drawn; `report`: called with the number of batches done and of all.
+
+    **Raises:** `ValueError` for unknown parameters, bounds that do not ascend or do not hold the design, no batch, and
+    batches of fewer than 2 designs.
+    """
+    require_x64()
+    require_at_least(1, batches=batches)
+    require_at_least(2, batch=batch)
+    require_at_least(0, seed=seed)
+    checked_bounds(system, vary)
+    now = parameters(system)
+    own = np.array([(float(now[name]) - low) / (high - low) for name, (low, high) in vary.items()])
+    if outside := [name for name, p in zip(vary, own, strict=True) if not -1e-9 <= p <= 1 + 1e-9]:
+        raise InputError(f"The design itself must lie within the bounds, but {', '.join(outside)} does not.")
+    search, history = SurrogateSearch(own.clip(0, 1), batch, seed), []
+    for number in range(batches):
+        places = search.ask()
+        search.tell(places, np.asarray(values(designs_at(system, vary, places))))
+        history.append(float(np.min(_known(search.values)[-batch:])))
+        if report is not None:
+            report(number + 1, batches)
+    best = np.argsort(_known(search.values), kind="stable")[:AMONG]
+    places, found = search.places[best], search.values[best]
+    if confirm is not None:
+        places = np.vstack([search.first[0], places])
+        found = np.asarray(confirm(designs_at(system, vary, places)))
+    chosen = int(np.argmin(_known(found)))
+    place = places[chosen]
+    changed = not np.array_equal(place, search.first[0])
+    model = designs_at(system, vary, place[None])[0] if changed else system
+    numbers = {name: float(value) for name, value in parameters(model).items() if name in vary}
+    at_bound = [name for name, p in zip(vary, place, strict=True) if min(p, 1 - p) < AT_BOUND]
+    return Optimum(model, numbers, float(found[chosen]), tuple(at_bound), tuple(history), changed)
+
+
+class SurrogateSearch:
+    """A search that is asked for places and told the values there; its places follow from the values."""
+
+    def __init__(self, start: Float[np.ndarray, " n"], batch: int, seed: int):
+        """**Arguments:** place of the given design; places of a batch; seed."""
+        n = len(start)
+        self.batch, self.rng = batch, np.random.default_rng(seed)
+        self.first = sobol(n, -(-(2 * n + 4) // batch) * batch, self.rng)
+        self.first[0] = start
+        self.places, self.values = np.empty((0, n)), np.empty(0)
+        self.region = FIRST
+
+    def ask(self) -> Places:
+        """The next batch."""
+        if len(self.places) < len(self.first):
+            return self.first[len(self.places) :][: self.batch]
+        process, noise = _fitted(self.places, _standardised(self.values))
+        places = self._candidates(np.atleast_1d(process.kernel_.k1.length_scale))
+        mean, spread = process.predict(places, return_cov=True)
+        spread = spread + (1e-6 - noise) * np.eye(len(places))
+        samples = mean + self.rng.standard_normal((self.batch, len(places))) @ np.linalg.cholesky(spread).T
+        chosen: list[int] = []
+        for sample in samples:
+            sample[chosen] = np.inf
+            chosen.append(int(np.argmin(sample)))
+        return places[chosen]
+
+    def _candidates(self, lengths: Float[np.ndarray, " n"]) -> Places:
+        """Places in the region about the best design, wide in parameters that do little; half of their parameters are
+        as in the best design."""
+        middle = self.places[int(np.argmin(_known(self.values)))]
+        half = 0.5 * self.region * np.clip(lengths / np.exp(np.mean(np.log(lengths))), 0.3, 3.0)
+        low, high = np.clip(middle - half, 0, 1), np.clip(middle + half, 0, 1)
+        places = low + sobol(middle.size, CANDIDATES, self.rng) * (high - low)
+        moved = self.rng.random(places.shape) < 0.5
+        moved[np.arange(CANDIDATES), self.rng.integers(0, middle.size, CANDIDATES)] = True
+        return np.where(moved, places, middle)
+
+    def tell(self, places: Places, values: Float[np.ndarray, " designs"]) -> None:
+        """Take the values of designs; NaN for a design without a value."""
+        before = np.min(_known(self.values), initial=np.inf)
+        self.places, self.values = np.vstack([self.places, places]), np.append(self.values, values)
+        if len(self.places) > len(self.first):
+            won = np.min(_known(self.values)) < before
+            self.region = min(1.4 * self.region, 1.0) if won else 0.7 * self.region
+            self.region = FIRST if self.region < SMALLEST else self.region
+
+
+def _known(values: np.ndarray) -> np.ndarray:
+    """Values, with one worse than all others for designs without a value."""
+    fine = np.isfinite(values)
+    worst = np.max(values, where=fine, initial=-np.inf)
+    return np.where(fine, values, worst + abs(worst) + 1.0 if fine.any() else 0.0)
+
+
+def _standardised(values: np.ndarray) -> np.ndarray:
+    """Numbers of mean 0 and deviation 1 for the process: logarithms, or the values if one is not positive."""
+    known = _known(values)
+    if np.all(known > 0):
+        known = np.log(known + OFFSET * known[0])
+    return (known - np.mean(known)) / (np.std(known) or 1.0)
+
+
+def _fitted(places: np.ndarray, values: np.ndarray) -> tuple[Any, float]:
+    """The process with a length for each parameter, and the variance of its noise."""
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.gaussian_process import GaussianProcessRegressor, kernels  # takes a second to load
+
+    lengths: Any = np.full(places.shape[1], LENGTH)
+    kernel = kernels.Matern(lengths, (0.1, 5.0), nu=2.5) + kernels.WhiteKernel(NOISE, (1e-4, 1.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its bound: the parameter does nothing
+        process: Any = GaussianProcessRegressor(kernel).fit(places, values)
+    return process, process.kernel_.k2.noise_level

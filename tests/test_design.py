@@ -1,0 +1,166 @@
+"""Search, Sobol indices and budgets against closed forms; loads of the land against time histories."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from helpers import WELL, double_well
+
+import jaxcage as jc
+
+
+VARY = {"damping": (0.1, 1.0), "cubic": (0.5, 3.0)}
+
+
+def by_parameters(height):
+    """Values of designs by a function of their parameters."""
+    return lambda models: np.array([float(height(jc.parameters(model))) for model in models])
+
+
+def bowl(damping=0.4, cubic=1.5):
+    """Smallest, with the value 1, where damping and cubic are these."""
+    return by_parameters(lambda p: 1.0 + 40 * (p["damping"] - damping) ** 2 + (p["cubic"] - cubic) ** 2)
+
+
+@pytest.mark.parametrize("vary", [VARY, {"cubic": VARY["cubic"]}])
+def test_a_search_finds_a_known_optimum(vary: dict[str, tuple[float, float]]):
+    found = jc.design.surrogate_search(double_well(), vary, bowl(damping=WELL["damping"]))
+    assert found.objective == pytest.approx(1.0, abs=2e-3) and found.at_bound == () and found.changed
+    assert found.values == pytest.approx({n: {"damping": WELL["damping"], "cubic": 1.5}[n] for n in vary}, rel=0.05)
+    assert found.model.acceleration.cubic == pytest.approx(found.values["cubic"])  # pyright: ignore
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_search_among_many_valleys_beats_as_many_even_draws(seed: int):
+    """Rastrigin's function of four parameters; the draws are those of the same Sobol sequence."""
+    names = ("damping", "cubic", "stiffness", "forcing")
+    vary = {n: (0.2, 2.2) for n in names}
+    waves = lambda x: 10.0 + x**2 - 10 * jnp.cos(2 * jnp.pi * x)
+    height = by_parameters(lambda p: 1.0 + sum(waves(p[n] - 1.4) for n in names))
+    found = jc.design.surrogate_search(double_well(), vary, height, batches=10, batch=12, seed=seed)
+    drawn = jc.lanes.sobol(4, 120, seed) * 2.0 + 0.2
+    even = height([jc.replace(double_well(), **dict(zip(names, row, strict=True))) for row in drawn.tolist()])
+    assert found.objective < even.min()
+
+
+def test_designs_without_a_value_are_passed_over():
+    inside = bowl()
+    holes = lambda models: np.where([float(jc.parameters(m)["cubic"]) < 1.2 for m in models], np.nan, inside(models))
+    found = jc.design.surrogate_search(double_well(), VARY, holes, batches=6)
+    assert found.values["cubic"] >= 1.2 and found.objective < 1.05
+
+
+def test_the_best_of_many_with_noise_is_chosen_anew():
+    """Noise of 2 hides a bowl; by the bowl itself the design chosen is better than what the search took for best, and
+    one that is the best from the beginning stays."""
+    exact, rng, system = bowl(damping=0.7), np.random.default_rng(0), double_well()
+    noisy = lambda models: exact(models) + 2.0 * rng.normal(size=len(models))
+    lucky = jc.design.surrogate_search(system, VARY, noisy, batches=8)
+    chosen = jc.design.surrogate_search(system, VARY, noisy, confirm=exact, batches=8)
+    assert lucky.objective < 1.0 <= chosen.objective == pytest.approx(exact([chosen.model])[0])
+    assert chosen.objective <= exact([system])[0]
+    stays = jc.design.surrogate_search(system, VARY, noisy, confirm=bowl(**{n: WELL[n] for n in VARY}), batches=2)
+    assert not stays.changed and stays.objective == pytest.approx(1.0) and stays.model is system
+
+
+def test_a_bound_that_stops_the_search_is_named():
+    found = jc.design.surrogate_search(double_well(), VARY, bowl(damping=2.0))
+    assert found.at_bound == ("damping",) and found.values["damping"] <= 1.0 and "at bound" in str(found)
+
+
+@pytest.mark.wide
+def test_sobol_indices_of_ishigami():
+    """Ishigami and Homma's function, a = 7, b = 0.1: first 0.3139, 0.4424, 0, total 0.5576, 0.4424, 0.2437."""
+    names = ("damping", "cubic", "stiffness")
+    vary = {n: (0.5, 1.5) for n in names}
+
+    def ishigami(p):
+        x, y, z = (2 * np.pi * (float(p[n]) - 1.0) for n in names)
+        return np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
+
+    got = jc.design.global_sensitivity(double_well(), vary, by_parameters(ishigami), samples=1024)
+    for found, ends, exact in (
+        (got.first, got.first_interval, (0.3139, 0.4424, 0.0)),
+        (got.total, got.total_interval, (0.5576, 0.4424, 0.2437)),
+    ):
+        assert list(found.values()) == pytest.approx(exact, abs=0.05) and got.doubtful == ()
+        assert all(low <= value <= high for value, (low, high) in zip(exact, ends.values(), strict=True))
+
+
+def test_a_parameter_that_changes_nothing_and_scatter_of_the_motion():
+    """Two blocks that differ by noise of variance 0.5: their mean has a quarter of it, beside 1/12 of the parameter."""
+    rng = np.random.default_rng(0)
+    cubic = by_parameters(lambda p: p["cubic"])
+    values = lambda models: cubic(models)[:, None] + np.sqrt(0.5) * rng.normal(size=(len(models), 2))
+    vary = {"cubic": (0.5, 1.5), "damping": (0.1, 0.5)}
+    got = jc.design.global_sensitivity(double_well(), vary, values, samples=256)
+    assert got.scatter == pytest.approx(0.75, abs=0.1) and got.first["cubic"] == pytest.approx(0.25, abs=0.15)
+    still = jc.design.global_sensitivity(double_well(), vary, cubic, samples=8)
+    assert still.total["damping"] == 0.0 == still.first["damping"] and still.total_interval["damping"] == (0.0, 0.0)
+
+
+def test_tolerance_budget_is_the_root_of_squares():
+    elasticity = {"gap": 0.5, "mass": -2.0}
+    edge = jc.orbits.Sensitivity("zone 1 exit", "fold", 10000.0, {}, elasticity, {}, 1.0, "converged")
+    got = jc.design.tolerance_budget(edge, {"gap": 0.02, "mass": 0.01})
+    assert got.deviation == pytest.approx({"gap": 100.0, "mass": 200.0}) and got.unclear == ()
+    assert got.total == pytest.approx(np.hypot(100, 200))
+
+
+@pytest.mark.parametrize(
+    "vary, options, words",
+    [
+        ({"heat": (0.0, 1.0)}, {}, "must be a parameter"),
+        ({"damping": (1.0, 0.5)}, {}, "must ascend"),
+        ({"damping": (0.5, 1.0)}, {}, "must lie within the bounds, but damping does not"),
+        (VARY, {"batches": 0}, "at least 1"),
+        (VARY, {"batch": 1}, "at least 2"),
+    ],
+)
+def test_bad_input_gets_a_sentence(vary, options, words):
+    with pytest.raises(ValueError, match=words):
+        jc.design.surrogate_search(double_well(), vary, bowl(), **options)
+
+
+@pytest.mark.wide
+def test_a_failed_lane_counts_as_chaotic():
+    """Steps that are too long fail; a design of which nothing is known is not called calm."""
+    runs = jc.design.Runs(jc.rpm(9000, 10000, 2), discard=2, revolutions=2, method=jc.method("rk4", steps=2))
+    assert jc.design.chaotic_width(9000.0, 10000.0).values(runs)([jc.case("1a")]) == pytest.approx([1000.0])
+    priced = jc.design.chaotic_width(9000.0, 10000.0, price=100.0).values(runs)
+    assert priced([jc.case("1a")]) == pytest.approx([1000.0 + 100.0 * 2.0])
+
+
+@pytest.mark.wide
+def test_fresh_runs_share_nothing_with_those_of_a_search():
+    """Other speeds and states, twice as many speeds within the same range, and the states within the clearance."""
+    runs = jc.design.Runs(jc.rpm(9000, 10000, 3), discard=0, revolutions=1)
+    first, second = (runs.fresh(number, starts=2) for number in (1, 2))
+    for some, other in ((runs, first), (runs, second), (first, second)):
+        assert not set(some.speed[:-1]) & set(other.speed[:-1])
+    assert second.speed.size == 6 and np.all(np.diff(second.speed) > 0)
+    assert jc.rpm(9000) <= second.speed[0] and second.speed[-1] == pytest.approx(jc.rpm(10000))
+    states = [jc.design.drawn_states(jc.case("1a"), runs.speed, 2, run.seed or 0) for run in (first, second)]
+    assert np.abs(states[0][..., :2]).max() < 0.6 * float(jc.case("1a").clearance)
+    assert not np.allclose(*states)
+
+
+@pytest.mark.wide
+def test_loads_of_the_land_are_those_of_a_time_history():
+    """1b at two speeds, one of them within a chaotic zone. Where motion is chaotic two integrations part: they are
+    compared over few revolutions."""
+    models = [jc.replace(jc.case("1b"), guidance_gap=gap, eccentricity=e) for gap, e in ((6e-4, 23e-6), (3e-4, 59e-6))]
+    method, fine = (jc.method("rk4", steps=steps) for steps in (1024, 2048))
+    found = jc.design.Runs(jc.rpm(9000, 27500, 2), starts=2, discard=60, revolutions=20, method=method).run(models)
+    got, last, touched = jc.design.land_loads(models, found, method), found["last"].values, 0
+    for lane in np.ndindex(*last.shape[:-1]):
+        model, speed = models[lane[0]], float(found["speed"][lane[1]])
+        run = jc.simulate(model, speed, start=tuple(last[lane]), revolutions=4, samples=1024, method=fine)
+        seen = {name: each.value for name, each in jc.analysis.measures(model, run).items()}
+        load = seen["mean_contact_force"] * speed * float(model.land_radius)
+        assert got["wear load"][lane] == pytest.approx(load, rel=0.02, abs=1e-6)
+        assert got["peak land force"][lane] == pytest.approx(seen["peak_contact_force"], rel=0.06, abs=1e-6)
+        assert got["film drag power"][lane] == pytest.approx(seen["drag_power"], rel=0.02)
+        thinnest = seen["minimum_film_thickness"]
+        assert got["least film"][lane] == pytest.approx(thinnest, abs=0.01 * float(model.clearance))
+        touched += load > 1.0
+    assert touched >= 2
