@@ -1,9 +1,9 @@
 """Designs for calm operation: the lowest cost at which all requirements hold, by exact gradients.
 
 Requirements are constraints of sequential programmes within a trust region, each solved by SciPy's SLSQP, or of an
-augmented Lagrangian whose descent is optax's. A step at which an edge is lost is halved. With
-tolerances each requirement is kept by the worst bearing within them: its constraint is tightened by what the worst
-corner takes away, which the gradient names and a full solution at the corner measures, until both agree.
+augmented Lagrangian whose descent is optax's. A step at which an edge is lost is halved. With tolerances each
+requirement is that of the worst bearing within them: the gradient names the corner, and the edges are solved for there.
+The derivatives there are those of the worst case (the envelope theorem).
 """
 
 import abc
@@ -29,17 +29,19 @@ from .tolerance import Budget, Tolerance, budget_of, corner, widened
 from .unstable_width import UnstableWidth
 
 
+AT_BOUND = 1e-6  # distance from a bound, over both bounds' distance, of a place at it
 LOST = 10.0  # slack of every requirement, negative, at a trial that has no values
 KEPT = 1e-3  # slack, negative, at which a requirement still counts as kept
 ACTIVE = 5e-3  # slack below which a requirement takes part in the cost
-ROUNDS = 4  # of tightening by the worst corners
+NEAR_STOP = 0.03  # distance of a trial that lost an edge, over the bounds, at which it stops the search
 ITERATIONS, ACCURACY = 30, 1e-4
 FIRST_RADIUS, LARGEST_RADIUS, LEAST_RADIUS = 0.1, 0.4, 2e-3  # of the steps, over the bounds
 PENALTY = 10.0  # price of a shortfall by 1, over the cost of the given design
 
 
 class Trial(NamedTuple):
-    """A place of the design space: cost with its derivatives, slacks of the requirements with theirs, and values."""
+    """A place of the design space: cost with its derivatives, slacks of the requirements with theirs, for the worst
+    bearing within the tolerances; nominal values, and those of the worst bearing for each requirement."""
 
     place: Float[np.ndarray, " n"]
     cost: float
@@ -47,6 +49,7 @@ class Trial(NamedTuple):
     slack: Float[np.ndarray, " m"]
     slack_slope: Float[np.ndarray, "m n"]
     values: dict[str, Value]
+    worst: dict[str, Value]
     lost: str = ""
 
 
@@ -60,8 +63,10 @@ class Design:
     - `short`: how far each broken requirement is from holding, in its unit; `conflict`: requirements and bounds that
         together forbid a feasible design, empty if there is one.
     - `prices`: what one unit more of each requirement that binds costs (Lagrange multipliers).
-    - `at_bound`: parameters at a bound; `corners`: values at the worst corner of the tolerances for each requirement.
-    - `budget`: how wide each tolerance may be; `notes`: edges that ended on the way, and what bounds the range now.
+    - `at_bound`: parameters at a bound; `worst`: what each requirement is for the worst bearing within the tolerances.
+    - `stopped_by`: the edge that a further step towards less cost would lose, if that and no requirement ends the
+        search; `notes`: edges that ended on the way, and what bounds the range now.
+    - `budget`: how wide each tolerance may be.
     - `evaluations`: designs whose edges were solved for; `checked`: a sweep from many initial states, None without.
     """
 
@@ -77,8 +82,9 @@ class Design:
     conflict: tuple[str, ...]
     prices: dict[str, float]
     at_bound: tuple[str, ...]
-    corners: dict[str, Value]
+    worst: dict[str, Value]
     budget: list[Budget]
+    stopped_by: str
     notes: tuple[str, ...]
     evaluations: int
     path: list[dict[str, float]]
@@ -105,7 +111,6 @@ class _Problem(abc.ABC):
 
     def __init__(self, space: DesignSpace, operating: tuple[float, float], wanted: list[Requirement], free: np.ndarray):
         self.space, self.operating, self.wanted, self.free = space, operating, wanted, free
-        self.tightened = np.zeros(len(wanted))
         self.trials: dict[bytes, Trial] = {}
         self.notes: list[str] = []
 
@@ -128,7 +133,12 @@ class _Problem(abc.ABC):
     def nowhere(self, place: np.ndarray, cost: float, slope: np.ndarray, why: str) -> Trial:
         """A trial at which an edge is lost."""
         m, n = len(self.wanted), place.size
-        return Trial(place, cost, slope, np.full(m, -LOST), np.zeros((m, n)), {}, why)
+        return Trial(place, cost, slope, np.full(m, -LOST), np.zeros((m, n)), {}, {}, why)
+
+    @property
+    def evaluations(self) -> int:
+        """Designs whose edges were solved for."""
+        return len(self.trials)
 
     def whole(self, x: np.ndarray, like: np.ndarray) -> np.ndarray:
         """The place of the parameters that vary, the others as they are at `like`."""
@@ -136,34 +146,58 @@ class _Problem(abc.ABC):
         place[self.free] = x
         return place
 
-    def slack(self, place: np.ndarray) -> np.ndarray:
-        """Slacks, less what the tolerances take away."""
-        return self.at(place).slack - self.tightened
-
 
 class _CostProblem(_Problem):
     """Requirements over an operating range, and a cost that is cheap to compute."""
 
-    def __init__(self, range_: OperatingRange, wanted: list[Requirement], cost: Callable[[Any], Any], free: np.ndarray):
+    def __init__(
+        self,
+        range_: OperatingRange,
+        wanted: list[Requirement],
+        cost: Callable[[Any], Any],
+        free: np.ndarray,
+        tolerance: Mapping[str, Tolerance],
+    ):
         super().__init__(range_.space, range_.operating, wanted, free)
-        self.range, self.cost, self.notes = range_, cost, range_.handed_over
+        self.range, self.cost, self.tolerance, self.notes = range_, cost, tolerance, range_.handed_over
+        self.solved: dict[bytes, dict[str, Value] | str] = {}
 
     def foreseen(self, trial: Trial, place: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = function_value(self.cost, self.range.space, jnp.asarray(place))
+        value, slope = function_value(self.cost, self.space, jnp.asarray(place))
         return float(value), np.asarray(slope)
 
+    @property
+    def evaluations(self) -> int:
+        return len(self.solved)
+
+    def _values(self, place: np.ndarray) -> dict[str, Value] | str:
+        """Values of one bearing; or why there are none."""
+        key = place.tobytes()
+        if key not in self.solved:
+            before = len(self.notes)
+            values = values_at(self.range, place, self.wanted)
+            if not isinstance(values, str) and len(self.notes) > before:
+                if min(r.slack(values[r.of])[0] for r in self.wanted[:2]) < -KEPT:
+                    values = "; ".join(self.notes[before:])  # the wrong side of a jump, where no slope leads back
+                    self.range.forget(place)
+            self.solved[key] = values
+        return self.solved[key]
+
     def compute(self, place: np.ndarray) -> Trial:
-        value, slope = function_value(self.cost, self.range.space, jnp.asarray(place))
-        before = len(self.notes)
-        values = values_at(self.range, place, self.wanted)
-        pairs = [] if isinstance(values, str) else [r.slack(values[r.of]) for r in self.wanted]
-        if pairs and len(self.notes) > before and min(s for s, _ in pairs[:2]) < -KEPT:
-            values = "; ".join(self.notes[before:])  # a jump to the wrong side, where no slope leads back
-            self.range.forget(place)
+        value, slope = function_value(self.cost, self.space, jnp.asarray(place))
+        cost, values = (float(value), np.asarray(slope)), self._values(place)
         if isinstance(values, str):
-            return self.nowhere(place, float(value), np.asarray(slope), values)
+            return self.nowhere(place, *cost, values)
+        worst, pairs = {}, []
+        for r in self.wanted:
+            there = corner(self.space, place, r.slack(values[r.of])[1], self.tolerance)
+            made = self._values(there) if self.tolerance else values
+            if isinstance(made, str):
+                return self.nowhere(place, *cost, f"within the tolerances: {made}")
+            worst[r.name] = made[r.of]
+            pairs.append(r.slack(made[r.of]))
         slack, by = (np.array(x) for x in zip(*pairs, strict=True))
-        return Trial(place, float(value), np.asarray(slope), slack, by, values)
+        return Trial(place, *cost, slack, by, values, worst)
 
 
 class _WidthProblem(_Problem):
@@ -183,7 +217,7 @@ class _WidthProblem(_Problem):
         values = {"width": found} | {r.of: balance_grade(self.space, self.operating, place) for r in self.wanted}
         pairs = [r.slack(values[r.of]) for r in self.wanted]
         slack, by = np.array([s for s, _ in pairs]), np.array([d for _, d in pairs]).reshape(-1, place.size)
-        return Trial(place, found.value, found.slope, slack, by, values)
+        return Trial(place, found.value, found.slope, slack, by, values, {})
 
 
 def design_for(
@@ -242,29 +276,21 @@ def design_for(
         problem: _Problem = _WidthProblem(UnstableWidth(space, operating, method), keep, free)
     else:
         range_ = OperatingRange(space, operating, keep.margin, method)
-        problem = _CostProblem(range_, listed(keep, model), cost_function(cost, model), free)
+        problem = _CostProblem(range_, listed(keep, model), cost_function(cost, model), free, tolerance)
     own = np.where(free, np.clip(space.place, 0, 1), space.place)
-    count, found = int(free.sum()), []
+    count = int(free.sum())
     places = [own] + [problem.whole(x, own) for x in sobol(count, max(starts, 2), seed)[: starts - 1]]
-    for i, begin in enumerate(places):
-        problem.tightened = np.zeros(len(problem.wanted))
-        best = SEARCHES[search](problem, begin, lambda done: say(f"search {i + 1}", done, ITERATIONS))
-        for _ in range(ROUNDS if tolerance else 0):
-            taken = _taken_by_corners(problem, best, tolerance)
-            if np.all(problem.at(best).slack - taken >= -KEPT) and np.all(np.abs(taken - problem.tightened) < 0.01):
-                break
-            problem.tightened = taken
-            best = SEARCHES[search](problem, best, lambda done: say(f"search {i + 1}", done, ITERATIONS))
-        found.append((best, problem.tightened.copy()))
-    best, problem.tightened = min(found, key=lambda pair: _merit(problem, *pair))
-    return _described(problem, best, tolerance, check, say)
+    found = [
+        SEARCHES[search](problem, begin, lambda done, i=i: say(f"search {i + 1}", done, ITERATIONS))
+        for i, begin in enumerate(places)
+    ]
+    return _described(problem, min(found, key=lambda place: _merit(problem, place)), tolerance, check, say)
 
 
-def _merit(problem: _Problem, place: np.ndarray, tightened: np.ndarray) -> tuple[float, float]:
+def _merit(problem: _Problem, place: np.ndarray) -> tuple[float, float]:
     """Order of designs: by what they fall short, then by cost."""
     trial = problem.at(place)
-    short = float(np.max(np.maximum(tightened - trial.slack - KEPT, 0), initial=0.0))
-    return short, trial.cost
+    return float(np.max(np.maximum(-trial.slack - KEPT, 0), initial=0.0)), trial.cost
 
 
 # --- searches -------------------------------------------------------------------------------------------------------
@@ -280,7 +306,7 @@ def _programme(problem: _Problem, begin: np.ndarray, say: Callable[[int], None])
     """
     trial, radius, largest = problem.at(begin), FIRST_RADIUS, LARGEST_RADIUS
     size = max(abs(trial.cost), 1e-12)
-    short = lambda t: max(0.0, -float(np.min(t.slack - problem.tightened, initial=np.inf)))
+    short = lambda t: max(0.0, -float(np.min(t.slack, initial=np.inf)))
     merit = lambda t: t.cost / size + PENALTY * short(t)
     for turn in range(ITERATIONS):
         step, foreseen = _step(problem, trial, radius, size)
@@ -291,7 +317,7 @@ def _programme(problem: _Problem, begin: np.ndarray, say: Callable[[int], None])
         kept = (merit(trial) - merit(new)) / gain
         if kept < 0.25 or new.lost:
             radius = min(radius, float(np.max(np.abs(step)))) / 2
-            largest = radius if new.lost else largest  # a longer step would lose the edge again
+            largest = radius / 2 if new.lost else largest  # after this step a longer one would lose the edge again
         elif kept > 0.75:
             radius = min(2 * radius, largest)
         if kept > 0.1 and not new.lost:
@@ -302,7 +328,7 @@ def _programme(problem: _Problem, begin: np.ndarray, say: Callable[[int], None])
 
 def _step(problem: _Problem, trial: Trial, radius: float, size: float) -> tuple[np.ndarray, float]:
     """The step within a radius to where the linearised requirements hold at the least cost, and the merit there."""
-    x, slack = trial.place[problem.free], trial.slack - problem.tightened
+    x, slack = trial.place[problem.free], trial.slack
     slope, last = trial.slack_slope[:, problem.free], np.append(np.zeros(x.size), PENALTY)
     bounds = [(max(-radius, -v), min(radius, 1 - v)) for v in x]
 
@@ -338,7 +364,7 @@ def _augmented(problem: _Problem, begin: np.ndarray, say: Callable[[int], None])
         state = adam.init(jnp.asarray(place[problem.free]))
         for _ in range(steps):
             trial = problem.at(place)
-            broken = np.maximum(0.0, multiplier - weight * problem.slack(place))
+            broken = np.maximum(0.0, multiplier - weight * problem.at(place).slack)
             slope = (trial.cost_slope / size - broken @ trial.slack_slope)[problem.free]
             move, state = adam.update(jnp.asarray(slope), state)
             step, free = np.asarray(move), place[problem.free]
@@ -348,45 +374,44 @@ def _augmented(problem: _Problem, begin: np.ndarray, say: Callable[[int], None])
                     place = there
                     break
                 step = step / 2
-        multiplier = np.maximum(0.0, multiplier - weight * problem.slack(place))
+        multiplier = np.maximum(0.0, multiplier - weight * problem.at(place).slack)
         say((turn + 1) * ITERATIONS // rounds)
     known = [t.place for t in problem.trials.values() if not t.lost]
-    return min([place, *known], key=lambda x: _merit(problem, x, problem.tightened))
+    return min([place, *known], key=lambda x: _merit(problem, x))
 
 
 SEARCHES: dict[str, Any] = {"slsqp": _programme, "augmented": _augmented}
 
 
-def _taken_by_corners(
-    problem: _Problem, place: np.ndarray, tolerance: Mapping[str, Tolerance]
-) -> Float[np.ndarray, " m"]:
-    """What the worst corner of the tolerances takes away from each slack, by a full solution there."""
-    trial = problem.at(place)
-    taken = np.zeros(len(problem.wanted))
-    for i in range(len(problem.wanted)):
-        there = problem.at(corner(problem.space, place, trial.slack_slope[i], tolerance))
-        taken[i] = trial.slack[i] - there.slack[i]
-    return np.maximum(taken, 0.0)
-
-
 # --- result ---------------------------------------------------------------------------------------------------------
 
 
-def _multipliers(
-    problem: _Problem, trial: Trial, objective: np.ndarray
-) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " n"]]:
-    """Lagrange multipliers of the requirements that bind and of the bounds, for a gradient of the objective."""
-    slack = problem.slack(trial.place)
-    binding = np.flatnonzero(slack < ACTIVE + max(0.0, -float(np.min(slack, initial=np.inf))))
-    x, free = trial.place[problem.free], trial.slack_slope[:, problem.free]
-    low, high = np.flatnonzero(x < 1e-6), np.flatnonzero(x > 1 - 1e-6)
+def _weights(slopes: np.ndarray, x: np.ndarray, objective: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lagrange multipliers of requirements with these slopes, and of the bounds, for a gradient of the objective."""
     unit = np.eye(x.size)
-    columns = np.column_stack([*free[binding], *unit[low], *-unit[high], np.zeros(x.size)])
-    weights, _ = nnls(columns, objective)
-    of_slack, of_bound = np.zeros(len(slack)), np.zeros(x.size)
-    of_slack[binding] = weights[: binding.size]
-    of_bound[np.concatenate([low, high])] = weights[binding.size : -1]
-    return of_slack, of_bound
+    low, high = np.flatnonzero(x < AT_BOUND), np.flatnonzero(x > 1 - AT_BOUND)
+    found, _ = nnls(np.column_stack([*slopes, *unit[low], *-unit[high], np.zeros(x.size)]), objective)
+    of_bound = np.zeros(x.size)
+    of_bound[np.concatenate([low, high])] = found[len(slopes) : -1]
+    return found[: len(slopes)], of_bound
+
+
+def _conflict(problem: _Problem, trial: Trial, names: list[str]) -> tuple[str, ...]:
+    """Requirements and bounds that together forbid a feasible design: at the least shortfall some weights make the
+    slopes of the worst requirements vanish, up to bounds."""
+    worst = np.flatnonzero(trial.slack < trial.slack.min() + ACTIVE)
+    slopes, x = trial.slack_slope[worst][:, problem.free], trial.place[problem.free]
+    size = max(float(np.abs(slopes).max()), 1e-12)
+    ones = np.column_stack([slopes, np.full(worst.size, 10 * size)])  # the weights add up to 1
+    weights, bounds = _weights(ones, np.append(x, 0.5), np.append(np.zeros(x.size), 10 * size))
+    against = [problem.wanted[k].name for k, w in zip(worst, weights, strict=True) if w > 1e-3]
+    return (*against, *(f"the bound of {n}" for n, w in zip(names, bounds, strict=False) if w > 1e-3 * size))
+
+
+def _stop(problem: _Problem, best: np.ndarray) -> str:
+    """What a further step would have lost, if the search ended for that reason."""
+    near = [t for t in problem.trials.values() if t.lost and float(np.max(np.abs(t.place - best))) < NEAR_STOP]
+    return near[-1].lost if near else ""
 
 
 def _described(
@@ -398,39 +423,35 @@ def _described(
 ) -> Design:
     """All that is known of the best place."""
     space, wanted = problem.space, problem.wanted
-    trial, own = problem.at(best), problem.at(space.place)
-    names = np.array(space.names)[problem.free]
-    slack = problem.slack(best)
+    trial, own, x = problem.at(best), problem.at(space.place), best[problem.free]
+    names = np.array(space.names)[problem.free].tolist()
+    slack, prices, conflict = trial.slack, dict[str, float](), tuple[str, ...]()
     feasible = not trial.lost and bool(np.all(slack >= -KEPT))
-    short = {r.name: float(-s * r.size) for r, s in zip(wanted, slack, strict=True) if s < -KEPT}
-    conflict: tuple[str, ...] = ()
-    prices: dict[str, float] = {}
     if feasible:
-        of_slack, of_bound = _multipliers(problem, trial, trial.cost_slope[problem.free])
-        prices = {r.name: float(w / r.size) for r, w in zip(wanted, of_slack, strict=True) if w > 0}
+        binding = np.flatnonzero(slack < ACTIVE)
+        slopes = trial.slack_slope[binding][:, problem.free]
+        weights, _ = _weights(slopes, x, trial.cost_slope[problem.free])
+        prices = {wanted[k].name: float(w / wanted[k].size) for k, w in zip(binding, weights, strict=True) if w > 0}
     elif not trial.lost:
-        worst = int(np.argmin(slack))
-        of_slack, of_bound = _multipliers(problem, trial, -trial.slack_slope[worst, problem.free])
-        against = [r.name for r, w in zip(wanted, of_slack, strict=True) if w > 0 and r is not wanted[worst]]
-        bounds = [f"the bound of {n}" for n, w in zip(names, of_bound, strict=True) if w > 0]
-        conflict = (wanted[worst].name, *against, *bounds)
-    x = best[problem.free]
-    at_bound = tuple(n for n, v in zip(names.tolist(), x, strict=True) if v < 1e-6 or v > 1 - 1e-6)
-    corners = {}
-    for i, r in enumerate(wanted if tolerance and not trial.lost else []):
-        there = problem.at(corner(space, best, trial.slack_slope[i], tolerance))
-        corners |= {r.name: there.values[r.of]} if r.of in there.values else {}
-    budget = (
-        budget_of(space, tolerance, trial.slack_slope, slack, [r.name for r in wanted])
-        if tolerance and not trial.lost
-        else []
-    )
-    model = space.model(best)
-    checked = check_design(model, problem.operating, check, say) if check and not trial.lost else None
-    changed = {n: float(v) for n, v in space.values(best).items() if n in names}
-    path = [space.values(t.place) | {"cost": t.cost} for t in problem.trials.values() if not t.lost]
+        conflict = _conflict(problem, trial, names)
     return Design(
-        *(model, changed, trial.cost, own.cost, wanted, own.values, trial.values, feasible, short, conflict, prices),
-        *(at_bound, corners, budget, tuple(dict.fromkeys(problem.notes)), len(problem.trials), path),
-        checked,
+        model=space.model(best),
+        values={n: v for n, v in space.values(best).items() if n in names},
+        cost=trial.cost,
+        cost_before=own.cost,
+        requirements=wanted,
+        before=own.values,
+        after=trial.values,
+        feasible=feasible,
+        short={r.name: float(-s * r.size) for r, s in zip(wanted, slack, strict=True) if s < -KEPT},
+        conflict=conflict,
+        prices=prices,
+        at_bound=tuple(n for n, v in zip(names, x, strict=True) if min(v, 1 - v) < AT_BOUND),
+        worst=trial.worst,
+        budget=budget_of(space, tolerance, trial.slack_slope, slack, [r.name for r in wanted]) if tolerance else [],
+        stopped_by=_stop(problem, best),
+        notes=tuple(dict.fromkeys(problem.notes)),
+        evaluations=problem.evaluations,
+        path=[space.values(t.place) | {"cost": t.cost} for t in problem.trials.values() if not t.lost],
+        checked=check_design(space.model(best), problem.operating, check, say) if check and not trial.lost else None,
     )
