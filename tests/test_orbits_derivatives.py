@@ -171,7 +171,10 @@ def test_derivatives_of_a_multiplier_against_autodiff():
     system = system_of(jnp.asarray(DOUBLE_WELL[0]))
     at = lambda s: jnp.abs(jc.periodic_orbit(s, 1.15, guess=DOUBLE_WELL[1], method=METHOD).multipliers[0])
     slope = jax.grad(at)(system)
-    got = jc.orbits.leading_multiplier(system, 1.15, DOUBLE_WELL[1], method=METHOD)
-    assert got.size == pytest.approx(float(at(system)), rel=1e-10)
-    for name, value in got.derivative.items():
+    names = tuple(jc.parameters(system))
+    space = jc.design.DesignSpace(system, np.zeros(len(names)), np.ones(len(names)), names)
+    orbit = jc.periodic_orbit(system, 1.15, guess=DOUBLE_WELL[1], method=METHOD)
+    got = jc.orbits.orbit_slopes(space, space.place, orbit)
+    assert got.multiplier == pytest.approx(float(at(system)), rel=1e-10)
+    for name, value in zip(names, got.multiplier_slope, strict=True):
         assert value == pytest.approx(float(jc.parameters(slope)[name]), rel=1e-7, abs=1e-9), name

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .continuation import ContinuationProblem, correct
-from .point import UNEXPLAINED, test_functions, to_critical
+from .point import COMPLEX, UNEXPLAINED, test_functions, to_critical
 from .step_counts import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
 from .step_lengths import Points
 
@@ -194,7 +194,7 @@ def _gaps(problem: ContinuationProblem, row: Points, seen: Sequence[tuple[int, s
 def _likely(problem: ContinuationProblem, row: Points) -> list[tuple[int, str]]:
     """Return the changes of sign without products of two multipliers that pass 1 while no complex pair leaves."""
     mu = problem.multipliers(row)
-    pairs = np.sum((np.abs(mu) >= 1) & (np.abs(np.imag(mu)) > 1e-9), axis=-1)
+    pairs = np.sum((np.abs(mu) >= 1) & (np.abs(np.imag(mu)) > COMPLEX), axis=-1)
     return [(k, kind) for k, kind in sign_changes(problem, row) if kind != "Neimark-Sacker" or pairs[k] != pairs[k + 1]]
 
 

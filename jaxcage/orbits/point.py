@@ -30,6 +30,10 @@ CRITICAL = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}
 """The critical multiplier of each kind that has a real one."""
 
 
+COMPLEX = 1e-5
+"""Least imaginary part of a complex multiplier: a double real one has the root of rounding."""
+
+
 def _second_compound(m: Float[Array, "n n"]) -> Float[Array, "k k"]:
     """Return all 2 x 2 minors of `m`, k = n (n - 1)/2: the eigenvalues are products of pairs of those of `m`."""
     i, j = np.triu_indices(m.shape[0], 1)
@@ -86,7 +90,7 @@ def to_critical(kind: str, multipliers: Complex[Array, " n"]) -> Float[Array, ""
     For a Neimark-Sacker bifurcation only complex multipliers count: a real pair whose product is 1 is a neutral saddle.
     """
     if kind == "Neimark-Sacker":
-        return jnp.min(jnp.where(jnp.abs(multipliers.imag) > 1e-9, jnp.abs(jnp.abs(multipliers) - 1), jnp.inf))
+        return jnp.min(jnp.where(jnp.abs(multipliers.imag) > COMPLEX, jnp.abs(jnp.abs(multipliers) - 1), jnp.inf))
     return jnp.min(jnp.abs(multipliers - CRITICAL[kind]))
 
 
