@@ -1,5 +1,6 @@
 """Commands about designs: better ones, tolerances, and values that are known within ranges only."""
 
+import dataclasses
 import math
 from functools import partial
 from typing import Annotated, Any
@@ -12,6 +13,7 @@ import jaxcage as jc
 from .._errors import InputError
 from . import options as o
 from .answer import Answer
+from .calm_design import calm_design
 from .subject import RPM, Subject, read_case
 from .values import no_worse_balance, read_bounds
 
@@ -39,15 +41,19 @@ def design(
     slip: o.Price = None,
     balance: o.Price = None,
     worse_balance: bool = False,
+    search: o.OptionalText = None,
+    searches: o.FromOne = 1,
     steps: o.OptionalCount = None,
     batch: o.OptionalCount = None,
     seed: o.Seed = 0,
+    calm: o.CalmOptions = o.CalmOptions(),
     means: o.MeanOptions = o.MeanOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Change the design so that fewer speeds are chaotic; of a bearing so that wear, forces and losses are small.
+    """The cheapest design of a cage that is calm over an --operating range, with margins, by exact gradients.
 
-    The best design is compared with the given one by runs that the search has not used.
+    Without that range fewer speeds are made chaotic, and of a bearing wear, forces and losses small, by a search on
+    simulations whose best design is compared with the given one by runs that the search has not used.
 
     Args:
         cost: Price of a unit of manufacturing cost of a cage [rpm of chaotic speeds]; 1000 if left out.
@@ -58,12 +64,26 @@ def design(
         slip: Of a bearing: weight of the slip of its cage.
         balance: Of a bearing: weight of the balance grade of its cage.
         worse_balance: Let the cage be balanced worse than it is.
-        steps: Steps of the search; 10 if left out, of a bearing 12.
-        batch: Designs of a step; 12 if left out, of a bearing 16.
+        search: Search for a design: slsqp or augmented with --operating, else surrogate, on simulations.
+        searches: With --operating: searches, the first from the design itself.
+        steps: Of surrogate: steps of the search; 10 if left out, of a bearing 12.
+        batch: Of surrogate: designs of a step; 12 if left out, of a bearing 16.
     """
     subject, d = read_case(case, means.load), jc.design
     model, bounds = subject.model, read_bounds(vary, subject)
     notes = [] if worse_balance else no_worse_balance(model, bounds)
+    search = search or ("surrogate" if calm.operating is None else "slsqp")
+    if search not in (known := ("surrogate", *d.SEARCHES)):
+        raise InputError(f"Option --search must be one of {', '.join(known)}, but '{search}' was given.")
+    if search != "surrogate":
+        if subject.with_rollers:
+            raise InputError(
+                f"Option --operating goes with a cage, whose orbits repeat, but {subject.name} is a bearing."
+            )
+        if calm.operating is None:
+            raise InputError(f"Option --search {search} goes with --operating.")
+        answer = calm_design(subject, bounds, calm, show, search=search, starts=searches, seed=seed)
+        return dataclasses.replace(answer, notes=[*notes, *answer.notes])
     given = {"wear": wear, "force": force, "impulse": impulse, "power": power, "slip": slip, "balance": balance}
     prices = {name: 1.0 if price is None else price for name, price in given.items()}
     if subject.with_rollers and not sum(prices.values()):

@@ -217,6 +217,35 @@ class MeanOptions:
         return {n: x if getattr(self, n) is None else getattr(self, n) for n, x in usual.items()}
 
 
+_ABOVE = number("be above 0", lambda x: x > 0)
+
+
+@dataclasses.dataclass(frozen=True)
+class CalmOptions:
+    """What a design of a cage must keep over an operating range."""
+
+    operating: OptionalText = None
+    """Range of speed in which the machine runs, e.g. "31500-44000 rpm shaft"."""
+    objective: Annotated[str, text("be cost or width", lambda x: x in ("cost", "width"))] = "cost"
+    """What is made small: cost, or the exact width of the unstable ranges within --operating."""
+    margin: Annotated[float, number("be at least 0 and below 50", lambda x: 0 <= x < 50)] = 10.0
+    """Least distance of both ends of the range from the edges of the stable range, per cent of speed."""
+    decay: Annotated[float | None, _ABOVE] = None
+    """Most revolutions in which a small disturbance falls to 1/e."""
+    least_film: OptionalText = None
+    """Least distance of cage and land, e.g. "20 um"."""
+    land_force: Annotated[float | None, number("be at least 0", lambda x: x >= 0)] = None
+    """Largest force of the land on the cage in calm motion [N]; 0: they do not touch."""
+    grade: Annotated[float | None, _ABOVE] = None
+    """Largest balance grade G [mm/s]."""
+    drag: Annotated[float | None, _ABOVE] = None
+    """Largest power to shear the film [W]."""
+    tolerance: OptionalText = None
+    """Tolerances within which all of this must hold, e.g. "guidance_gap=+-0.05 mm, eccentricity=G6.3"."""
+    check: FromZero = 16
+    """Initial states from which the result is simulated over the range; 0 leaves it out."""
+
+
 @dataclasses.dataclass(frozen=True)
 class ShowOptions:
     """Options of output."""

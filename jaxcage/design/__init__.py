@@ -40,8 +40,14 @@ from .paired_designs import (
     mean_gradient as mean_gradient,
     tolerance_budget as tolerance_budget,
 )
-from .requirements import COSTS as COSTS, Price as Price, Requirements as Requirements, cost_function as cost_function
-from .search import Design as Design, Trial as Trial, design_for as design_for
+from .requirements import (
+    COSTS as COSTS,
+    Price as Price,
+    Requirement as Requirement,
+    Requirements as Requirements,
+    cost_function as cost_function,
+)
+from .search import SEARCHES as SEARCHES, Design as Design, Trial as Trial, design_for as design_for
 from .statistics import (
     BALANCE as BALANCE,
     BEARING_MEASURES as BEARING_MEASURES,

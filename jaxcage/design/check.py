@@ -47,8 +47,12 @@ class Checked:
         )
         if not self.chaotic_rpm.size:
             return said
-        ends = f"{self.chaotic_rpm.min():.0f} to {self.chaotic_rpm.max():.0f} rpm"
-        return f"{said}; chaos coexists at {self.chaotic_rpm.size} speeds, {ends}"
+        low, high = f"{self.chaotic_rpm.min():.0f}", f"{self.chaotic_rpm.max():.0f} rpm of the cage"
+        lasts = " to ".join(
+            f"{x:.0f}" if np.isfinite(x) else "no end seen" for x in (self.mean_life.min(), self.mean_life.max())
+        )
+        where = f"at {self.chaotic_rpm.size} of the speeds, {low} to {high}"
+        return f"{said}; chaos coexists {where}, with a mean life of {lasts} revolutions"
 
 
 def check_design(

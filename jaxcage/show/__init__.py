@@ -37,6 +37,7 @@ from .columns import (
     write_columns as write_columns,
 )
 from .design_figures import (
+    calm_figure as calm_figure,
     chance_of_chaos as chance_of_chaos,
     elasticity_bars as elasticity_bars,
     optimum_figure as optimum_figure,
@@ -44,9 +45,12 @@ from .design_figures import (
 )
 from .design_tables import (
     before_and_after_table as before_and_after_table,
+    budget_of_tolerances_table as budget_of_tolerances_table,
     budget_table as budget_table,
     changed_table as changed_table,
+    requirement_table as requirement_table,
     sobol_table as sobol_table,
+    stricter as stricter,
 )
 from .diagrams import (
     add_shaft_axes as add_shaft_axes,

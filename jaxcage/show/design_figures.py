@@ -22,22 +22,25 @@ from .style import (
     PURPLE,
     SKY,
     VERMILION,
+    ZONE,
     axes_or_new,
     dress,
     entitled,
     legend_above,
+    legend_below,
     new_figure,
     readable,
 )
 
 
 if TYPE_CHECKING:
-    from ..design import BeforeAfter, MeanGradient, Optimum
+    from ..design import BeforeAfter, Design, MeanGradient, Optimum
 
 
 FIRST = ("guidance_gap", "eccentricity")
 """Parameters that are always on top."""
 EDGE_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+RPM = 30 / np.pi
 SURE = 0.05
 """Chances at most this far from 0 or 1 count as decided."""
 
@@ -169,3 +172,34 @@ def chance_of_chaos(
     ax.set_yticks(np.linspace(0, 1, 6))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, frameon=False, fontsize=8.5)
     return label_speed(ax)
+
+
+def calm_figure(found: "Design", operating: tuple[float, float], title: str = "") -> Figure:
+    """The stable range of a cage before and after, with its edges, beside the operating range; and the costs of the
+    designs that were solved for.
+
+    **Arguments:** the design; ends of the operating range of cage speed [rad/s]; title.
+    """
+    figure = new_figure(11.0, 3.6)
+    left, right = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
+    dress(left).axvspan(*(w * RPM for w in operating), color=ZONE, label="operating range")
+    ends = np.array(operating) * RPM
+    for row, values, colour in ((1, found.before, GREY), (0, found.after, BLUE)):
+        if "lower margin" not in values:
+            continue
+        low, high = (
+            end * (1 + sign * values[f"{name} margin"].value / 100)
+            for end, sign, name in zip(ends, (-1, 1), ("lower", "upper"), strict=True)
+        )
+        left.barh(row, high - low, left=low, height=0.5, color=colour, alpha=0.75)
+        for edge in (low, high):
+            left.annotate(f"{edge:.0f}", (edge, row + 0.3), ha="center", fontsize=8)
+    left.set(yticks=[0, 1], yticklabels=["after", "before"], xlabel="Cage speed [rpm]", ylim=(-0.6, 1.8))
+    left.margins(x=0.08)
+    left.set_title("Stable range of the synchronous orbit", fontsize=9, loc="left")
+    legend_below(figure, left)
+    costs = [step["cost"] for step in found.path]
+    dress(right).plot(np.arange(1, len(costs) + 1), costs, "o-", color=BLUE, markersize=3)
+    right.set(xlabel="Design solved for", ylabel="Cost")
+    right.xaxis.get_major_locator().set_params(integer=True)
+    return entitled(figure, title)

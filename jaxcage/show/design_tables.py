@@ -5,15 +5,17 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .._parameters import parameter_info, parameters
-from ..design import BeforeAfter, Optimum, SobolIndices, ToleranceBudget
-from .tables import SHOWN, Column, Table, rows_table
+from ..design import BeforeAfter, Design, Optimum, Requirement, SobolIndices, ToleranceBudget
+from .tables import SHOWN, Beside, Column, Table, rows_table, speed_columns
 
 
 MOST = 8
 """Parameters listed in a budget."""
+IDLE = 1.5
+"""A tolerance that may be wider by more than this factor buys nothing."""
 
 
-def changed_table(title: str, model: Any, found: Optimum, vary: Mapping[str, tuple[float, float]]) -> Table:
+def changed_table(title: str, model: Any, found: Optimum | Design, vary: Mapping[str, tuple[float, float]]) -> Table:
     """Parameters that were varied, before and after."""
     info, before, rows = parameter_info(model), parameters(model), []
     for name, value in found.values.items():
@@ -22,6 +24,67 @@ def changed_table(title: str, model: Any, found: Optimum, vary: Mapping[str, tup
         row = {"parameter": name.replace("_", " "), "unit": SHOWN.get(unit, unit), "bounds": " to ".join(numbers[2:])}
         rows.append(row | {"before": numbers[0], "after": numbers[1]})
     return rows_table(title, rows, [Column(head, ()) for head in ("parameter", "unit", "before", "after", "bounds")])
+
+
+def requirement_table(title: str, found: Design, beside: Beside = None) -> Table:
+    """What a design must keep: the limit, the given design, the new one, the worst bearing within tolerances, and the
+    speed to which the new value belongs."""
+    rows: list[dict[str, Any]] = []
+    for r in found.requirements:
+        if r.of == "peak" and found.after.get(r.of) and found.after[r.of].value == 0:
+            continue
+        row: dict[str, Any] = {"requirement": r.name, "unit": _SHOWN.get(r.of, SHOWN.get(r.unit, r.unit))}
+        row["limit"] = f"{'at least' if r.sign > 0 else 'at most'} {_text(r, r.limit)}"
+        values = {"before": found.before.get(r.of), "after": found.after.get(r.of), "worst": found.worst.get(r.name)}
+        row |= {name: None if each is None else _text(r, each.value) for name, each in values.items()}
+        after = found.after.get(r.of)
+        rows.append(row | {"rpm": None if after is None else after.rpm})
+    columns = [Column(head, ()) for head in ("requirement", "unit", "limit", "before", "after")]
+    columns += [Column("worst in tolerance", (), key="worst")] if found.budget else []
+    return rows_table(title, rows, [*columns, *speed_columns("at cage [rpm]", "rpm", beside)], "requirements")
+
+
+_SHOWN = {"multiplier": "rev."}
+"""Units of what is not shown in the unit of the requirement: a multiplier is shown as the time to fall to 1/e."""
+
+
+def _text(r: Requirement, value: float) -> str:
+    if r.of == "multiplier":
+        return f"{-1 / math.log(value):.4g}" if 0 < value < 1 else "unstable"
+    return Column("", [value], r.unit).cells[0]
+
+
+def stricter(found: Design) -> dict[str, float]:
+    """What a limit that is 10 % stricter costs, by requirement, of those that bind."""
+    limits = {r.name: r for r in found.requirements}
+    by = {}
+    for name, price in found.prices.items():
+        r = limits[name]
+        step = 0.1 * abs(r.limit)
+        if r.of == "multiplier":  # of the revolutions N to fall to 1/e, exp(-1/N) is the multiplier
+            step = 0.1 * -r.limit * math.log(r.limit)
+        by[name] = price * step
+    return by
+
+
+def budget_of_tolerances_table(model: Any, found: Design) -> Table:
+    """How wide each tolerance may be while the others stay."""
+    info, rows = parameter_info(model), []
+    for each in found.budget:
+        unit = info[each.name].unit
+        wide = Column("", [each.width, each.width * each.factor], unit).cells
+        most = wide[1] if math.isfinite(each.factor) else "any"
+        rows.append(
+            {"parameter": each.name.replace("_", " "), "unit": SHOWN.get(unit, unit), "width": wide[0], "may be": most}
+            | {"factor": each.factor, "limited by": each.requirement or "no requirement"}
+        )
+    idle = max(found.budget, key=lambda each: each.factor)
+    title = "Tolerances, from end to end"
+    if idle.factor > IDLE:
+        title += f": that of {idle.name.replace('_', ' ')} buys nothing, it may be {idle.factor:.2g} times as wide"
+    return rows_table(
+        title, rows, [Column(x, ()) for x in ("parameter", "unit", "width", "may be", "limited by")], "budget"
+    )
 
 
 def before_and_after_table(title: str, rows: Sequence[BeforeAfter]) -> Table:
