@@ -37,6 +37,12 @@ def tables(*titles: str) -> Part:
     return lambda text: printed("\n\n".join(part for part in text.split("\n\n") if part.startswith(titles)))
 
 
+def answer(text: str) -> str:
+    """All but what a command says of its run and its files."""
+    parts = text.split("\n\n")
+    return printed("\n\n".join([*parts[:-1], parts[-1].split("\nReadings:")[0]]))
+
+
 def figure(left: str, shown: str = "") -> Part:
     """The figure that the command left in `out`, under the name that it has in `experiments`."""
     return lambda text: shutil.copy(ROOT / "out" / left, ROOT / "experiments" / (shown or left)) and None
@@ -75,6 +81,7 @@ def speed(text: str) -> str:
 README, EDGE, DESIGN, PAPER = "README.md", "docs/edges.md", "docs/design.md", "docs/reproduction.md"
 REPRODUCE = "python -m experiments.reproduce --json"
 BETTER = 'jaxcage design nu2310 --speed "10000 rpm shaft"'
+CALM = 'jaxcage design 1a --operating "31500-44000 rpm shaft"'
 CHAOS = ("Chaotic zones of", "Transient chaos of")
 BLOCKS: dict[str, tuple[str, str, Part]] = {
     "sweep-1a-figure": (README, "jaxcage sweep 1a", figure("sweep_1a.png")),
@@ -85,6 +92,8 @@ BLOCKS: dict[str, tuple[str, str, Part]] = {
     "speed": (README, "python -m benchmarks", speed),
     "guide-zones-1a": (EDGE, "jaxcage zones 1a", tables("Synchronous-loss", "Elasticities", *CHAOS)),
     "bifurcations-1a-figure": (EDGE, "jaxcage bifurcations 1a", figure("bifurcations_1a.png")),
+    "design-calm": (DESIGN, CALM, answer),
+    "design-calm-figure": (DESIGN, CALM, figure("design_1a.png")),
     "design-1b": (DESIGN, "jaxcage design 1b", tables("Before and after", "Design of")),
     "design-1b-figure": (DESIGN, "jaxcage design 1b", figure("design_1b.png")),
     "searches-of-eight": (DESIGN, "python -m benchmarks.pay --table", printed),

@@ -28,6 +28,7 @@ from .step_lengths import Points, StepControl
 SHARE = "share"
 LONGEST, SHORTEST, MOST = 1.5, 1e-4, 40
 """Longest and shortest step, in clearances and tenths of the speed and of the largest relative change; most steps."""
+SAME_DESIGN = 1e-9  # designs nearer than this have the same edge but for the last steps of Newton's method
 SAME_EDGE = 2e-3
 """Largest relative distance of the edge by its final equations from the end of its curve."""
 
@@ -84,7 +85,7 @@ def follow(
     """
     require_x64()
     length = 10 * relative_change(system, other)
-    if length == 0:
+    if length < SAME_DESIGN:
         return _solved(other, point, name, method)
     given = Between(system, jnp.asarray(point.speed, dtype=float), other)
     units = np.array([0.1 * float(point.speed), 1 / length])
