@@ -15,6 +15,7 @@ from .values import read_each
 GRADE = re.compile(r"G\s*(\d+(?:\.\d*)?)", re.IGNORECASE)
 VERDICTS = {
     "calm": "Calm over {range}",
+    "stable, not checked": "Stable over {range}, not checked by simulations",
     "stable, but not from every start": "Stable over {range}, but not from every initial state",
 }
 

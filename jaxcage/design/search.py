@@ -92,10 +92,12 @@ class Design:
 
     @property
     def verdict(self) -> str:
-        """`calm`, `stable, but not from every start`, or `not feasible`."""
+        """`calm`, `stable, but not from every start`, `stable, not checked` or `not feasible`."""
         if not self.feasible:
             return "not feasible"
-        return "calm" if self.checked is None or self.checked.calm else "stable, but not from every start"
+        if self.checked is None:
+            return "stable, not checked"
+        return "calm" if self.checked.calm else "stable, but not from every start"
 
     def __str__(self) -> str:
         rows = [f"Design: {self.verdict}, cost {self.cost_before:.4g} -> {self.cost:.4g}"]
