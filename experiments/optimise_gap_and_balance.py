@@ -51,7 +51,9 @@ for name, colour in (("lower", "C0"), ("upper", "C3")):
     ax.plot(gaps, [edge.value_rpm for _, edge in edges], "o-", color=colour, label=f"{name} edge")
     for gap, (_, edge) in zip(gaps, edges, strict=True):
         slope = edge.derivative["guidance_gap"] * 1e-3
-        ax.annotate("", (gap + 0.02, edge.value_rpm + 0.02 * slope), (gap, edge.value_rpm), arrowprops={"arrowstyle": "->"})
+        ax.annotate(
+            "", (gap + 0.02, edge.value_rpm + 0.02 * slope), (gap, edge.value_rpm), arrowprops={"arrowstyle": "->"}
+        )
 ax.set(xlabel="Guidance gap [mm]", ylabel="Cage speed [rpm]", title="Edges and their gradients")
 ax.legend(fontsize=8)
 
@@ -64,7 +66,9 @@ ax = axes[0, 1]
 path = np.array([(1e3 * step["guidance_gap"], 1e6 * step["eccentricity"]) for step in best.path])
 ax.plot(*path.T, "o-", color="C0", label="search")
 ax.plot(*path[0], "s", color="0.4", label="given design")
-ax.plot(1e3 * best.values["guidance_gap"], 1e6 * best.values["eccentricity"], "*", color="C3", markersize=13, label="chosen")
+ax.plot(
+    1e3 * best.values["guidance_gap"], 1e6 * best.values["eccentricity"], "*", color="C3", markersize=13, label="chosen"
+)
 ax.set(xlabel="Guidance gap [mm]", ylabel="Eccentricity [µm]", title=f"{best.evaluations} designs solved for")
 ax.legend(fontsize=8)
 

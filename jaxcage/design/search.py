@@ -30,6 +30,7 @@ from .unstable_width import UnstableWidth
 
 
 AT_BOUND = 1e-6  # distance from a bound, over both bounds' distance, of a place at it
+WIDEST = 4.0  # largest multiple of a tolerance that is tried
 LOST = 10.0  # slack of every requirement, negative, at a trial that has no values
 KEPT = 1e-3  # slack, negative, at which a requirement still counts as kept
 ACTIVE = 5e-3  # slack below which a requirement takes part in the cost
@@ -190,16 +191,32 @@ class _CostProblem(_Problem):
         cost, values = (float(value), np.asarray(slope)), self._values(place)
         if isinstance(values, str):
             return self.nowhere(place, *cost, values)
-        worst, pairs = {}, []
-        for r in self.wanted:
-            there = corner(self.space, place, r.slack(values[r.of])[1], self.tolerance)
-            made = self._values(there) if self.tolerance else values
-            if isinstance(made, str):
-                return self.nowhere(place, *cost, f"within the tolerances: {made}")
-            worst[r.name] = made[r.of]
-            pairs.append(r.slack(made[r.of]))
+        made = self.worst(place, values, self.tolerance)
+        if isinstance(made, str):
+            return self.nowhere(place, *cost, f"within the tolerances: {made}")
+        pairs = [r.slack(made[r.name]) for r in self.wanted]
         slack, by = (np.array(x) for x in zip(*pairs, strict=True))
-        return Trial(place, *cost, slack, by, values, worst)
+        return Trial(place, *cost, slack, by, values, made)
+
+    def worst(
+        self, place: np.ndarray, values: dict[str, Value], tolerance: Mapping[str, Tolerance]
+    ) -> dict[str, Value] | str:
+        """What each requirement concerns for the worst bearing within tolerances; or why that is not known."""
+        found = {}
+        for r in self.wanted:
+            there = corner(self.space, place, r.slack(values[r.of])[1], tolerance)
+            made = self._values(there) if tolerance else values
+            if isinstance(made, str):
+                return made
+            found[r.name] = made[r.of]
+        return found
+
+    def broken(self, trial: Trial, tolerance: Mapping[str, Tolerance]) -> str:
+        """The requirement that does not hold within other tolerances, or what is lost there; empty if all hold."""
+        made = self.worst(trial.place, trial.values, tolerance)
+        if isinstance(made, str):
+            return made
+        return next((r.name for r in self.wanted if r.slack(made[r.name])[0] < -KEPT), "")
 
 
 class _WidthProblem(_Problem):
@@ -410,6 +427,21 @@ def _conflict(problem: _Problem, trial: Trial, names: list[str]) -> tuple[str, .
     return (*against, *(f"the bound of {n}" for n, w in zip(names, bounds, strict=False) if w > 1e-3 * size))
 
 
+def _budget(problem: _CostProblem, trial: Trial, tolerance: Mapping[str, Tolerance]) -> list[Budget]:
+    """How wide each tolerance may be while the others stay: foreseen at first order, then solved for at the corners,
+    and less wide until all requirements hold there."""
+    rows = []
+    for foreseen in budget_of(problem.space, tolerance, trial.slack_slope, trial.slack, problem.wanted):
+        most, found = min(foreseen.factor, WIDEST), foreseen._replace(factor=1.0)
+        for factor in (most, most**0.5, most**0.25):
+            why = problem.broken(trial, {**tolerance, foreseen.name: tolerance[foreseen.name].times(factor)})
+            found = found._replace(factor=factor if not why else 1.0, limit=why or found.limit)
+            if not why:
+                break
+        rows.append(found)
+    return rows
+
+
 def _stop(problem: _Problem, best: np.ndarray) -> str:
     """What a further step would have lost, if the search ended for that reason."""
     near = [t for t in problem.trials.values() if t.lost and float(np.max(np.abs(t.place - best))) < NEAR_STOP]
@@ -450,7 +482,7 @@ def _described(
         prices=prices,
         at_bound=tuple(n for n, v in zip(names, x, strict=True) if min(v, 1 - v) < AT_BOUND),
         worst=trial.worst,
-        budget=budget_of(space, tolerance, trial.slack_slope, slack, [r.name for r in wanted]) if tolerance else [],
+        budget=_budget(problem, trial, tolerance) if isinstance(problem, _CostProblem) and feasible else [],
         stopped_by=_stop(problem, best),
         notes=tuple(dict.fromkeys(problem.notes)),
         evaluations=problem.evaluations,

@@ -1,6 +1,6 @@
 """What manufacture makes of a design: tolerances, their worst corner, and how wide each may be."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,6 +9,7 @@ from jaxtyping import Float
 from .._errors import ArgumentError
 from .._parameters import parameters
 from .operating import DesignSpace
+from .requirements import Requirement
 
 
 class Tolerance(NamedTuple):
@@ -23,6 +24,10 @@ class Tolerance(NamedTuple):
         """An eccentricity that balancing to a grade G [mm/s] leaves at a cage speed [rad/s]: from 0 to e = G/speed."""
         return cls(0.0, 1e-3 * grade / speed, absolute=True)
 
+    def times(self, factor: float) -> "Tolerance":
+        """A tolerance so many times as wide."""
+        return self._replace(lower=factor * self.lower, upper=factor * self.upper)
+
     @property
     def width(self) -> float:
         """Distance of both ends [SI]."""
@@ -30,13 +35,13 @@ class Tolerance(NamedTuple):
 
 
 class Budget(NamedTuple):
-    """How wide one tolerance may be while the others stay: `factor` times as wide as it is, at first order, until
-    `requirement` no longer holds; infinite if it acts on none."""
+    """How wide one tolerance may be while the others stay: `factor` times as wide as it is, until `limit`, a requirement
+    or an edge that is lost, does not let it; empty if nothing limits it."""
 
     name: str
     width: float
     factor: float
-    requirement: str
+    limit: str
 
 
 def widened(
@@ -82,7 +87,7 @@ def budget_of(
     tolerance: Mapping[str, Tolerance],
     slack_slope: Float[np.ndarray, "m n"],
     slack: Float[np.ndarray, " m"],
-    names: list[str],
+    wanted: Sequence[Requirement],
 ) -> list[Budget]:
     """How wide each tolerance may be, from the slacks that are left at the worst corners, at first order."""
     rows = []
@@ -94,6 +99,6 @@ def budget_of(
         with np.errstate(divide="ignore", invalid="ignore"):
             room = np.where(takes > 0, np.maximum(slack, 0.0) / takes, np.inf)
         k = int(np.argmin(room))
-        limiting = names[k] if np.isfinite(room[k]) else ""
+        limiting = wanted[k].name if np.isfinite(room[k]) else ""
         rows.append(Budget(name, tolerance[name].width, 1 + float(room[k]), limiting))
     return rows

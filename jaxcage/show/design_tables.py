@@ -73,10 +73,14 @@ def budget_of_tolerances_table(model: Any, found: Design) -> Table:
     for each in found.budget:
         unit = info[each.name].unit
         wide = Column("", [each.width, each.width * each.factor], unit).cells
-        most = wide[1] if math.isfinite(each.factor) else "any"
         rows.append(
-            {"parameter": each.name.replace("_", " "), "unit": SHOWN.get(unit, unit), "width": wide[0], "may be": most}
-            | {"factor": each.factor, "limited by": each.requirement or "no requirement"}
+            {
+                "parameter": each.name.replace("_", " "),
+                "unit": SHOWN.get(unit, unit),
+                "width": wide[0],
+                "may be": wide[1],
+            }
+            | {"factor": each.factor, "limited by": each.limit or "no requirement"}
         )
     idle = max(found.budget, key=lambda each: each.factor)
     title = "Tolerances, from end to end"
