@@ -24,10 +24,8 @@ def calm_design(
     subject: Subject,
     bounds: dict[str, Any],
     calm: CalmOptions,
-    search: str,
-    seed: int,
-    searches: int,
     show: ShowOptions,
+    **searches: Any,
 ) -> Answer:
     """The answer of `jaxcage design` with an operating range."""
     model = subject.model

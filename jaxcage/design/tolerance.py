@@ -35,8 +35,8 @@ class Tolerance(NamedTuple):
 
 
 class Budget(NamedTuple):
-    """How wide one tolerance may be while the others stay: `factor` times as wide as it is, until `limit`, a requirement
-    or an edge that is lost, does not let it; empty if nothing limits it."""
+    """How wide one tolerance may be while the others stay: `factor` times as wide as it is. `limit` is the requirement,
+    or the edge that is lost, which does not let it be wider; empty if nothing limits it."""
 
     name: str
     width: float
