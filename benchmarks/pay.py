@@ -1,16 +1,20 @@
-"""Searches for a better design on eight variables: `python -m benchmarks.pay [--bearing 1b]`.
+"""Designs with and without gradients: `python -m benchmarks.pay [--case 1a] [--seeds 3]`.
 
-The objective is that of `jaxcage design`, fixed before anything was compared: chaotic speeds [rpm], 1000 for the wear
-load and 1000 for the peak force that the land has now, 1000 a unit of cost; balance may only get better. Every search
-has 300 designs, each run at 8 speeds from one start, ten at a time by one compiled program. What a search does between
-designs counts as processor time. Its answer is judged once more by finer steps, four times the speeds, and two starts
-more. The better of the rivals, in the median of its seeds, is what there is to be reached.
+The problem is that of `jc.design_for`: the lowest cost of a cage that is stable over an operating range, with a margin
+of 10 % at both ends, in eight variables. The search of `design_for` has exact derivatives. Three others have none and
+minimise cost over that of the given design, plus 10 times what the worst requirement falls short: CMA-ES, differential
+evolution, and the package's surrogate. A trial is the same for all: edges are followed from the nearest known design. A
+trial at which an edge is lost falls short by 10.
 
-Searches are kept in a ledger one by one (bearing, search, seed): the same command goes on where it stopped, `--table`
-shows what there is.
+The search with derivatives begins at the given design (seed 0) and at quasi-random designs. The others have the given
+design among their first and may try 150. One of them ends as soon as it is within 1 % of the least cost in the ledger,
+and is repeated if the ledger's least cost becomes lower. Processor time is that of the process and begins when the
+edges of the given design are known. The first search of a process also compiles its programs. Searches are kept in a
+ledger one by one: the same command goes on where it stopped, `--table` shows what there is.
 """
 
 import argparse
+import copy
 import functools
 import json
 import pathlib
@@ -25,259 +29,190 @@ from scipy.stats import qmc
 
 import jaxcage as jc
 from benchmarks.common import columns
-from jaxcage.design import (
-    AbstractObjective,
-    Chaos,
-    DesignSpace,
-    LandLoad,
-    SurrogateSearch,
-    chaotic_width,
-    cost,
-    relative,
-)
+from jaxcage.design.operating import DesignSpace, OperatingRange
+from jaxcage.design.requirements import Requirements, cost_function, listed
+from jaxcage.design.search import KEPT, SEARCHES, CostProblem
+from jaxcage.design.surrogate import SurrogateSearch
 from jaxcage.files import read_bearing
-from jaxcage.solve import DEFAULT_ERROR
+from jaxcage.lanes import sobol
 
 
-HERE = pathlib.Path(__file__).parent
-LEDGER = HERE / "pay.json"
-BUDGET, SHORT, TOGETHER, SEEDS = 300, 60, 10, 5
-"""Designs of a search, those after which its best is shown too, designs at a time, and searches of each kind."""
-SPEEDS, DISCARD, REVOLUTIONS, LOADED = 8, 60, 30, 1
-"""Speeds and revolutions of each design in a search; over the last revolutions wear and peak force are read."""
-LANE_REVOLUTIONS = SPEEDS * (DISCARD + REVOLUTIONS + LOADED)
-"""Lanes times revolutions that one design costs."""
-HOPELESS = 1e6
-"""Value of a design that failed [rpm]."""
-PRICE = 1000.0
-"""Price of wear load, peak land force and cost, as in `jaxcage design`."""
-BEARINGS = ("1b", "3a", "spindle")
-"""The spindle was not looked at while the searches were made."""
-RIVALS = ("CMA-ES", "differential evolution")
-HEAD = f"search,seeds,after {SHORT},after {BUDGET},checked,reached after,10^6 lane-rev,processor s".split(",")
-RELATIVE = {
-    "land_width": (0.7, 1.5),
-    "cage_mass": (0.8, 1.2),
-    "rib_diameter": (0.98, 1.02),
-    "amplitude": (0.7, 1.3),
-    "stiffness": (0.5, 2.0),
-}
-"""Bounds beside what the bearing has. The impact's amplitude stands for the pocket clearance, which acts through it,
-the contact's stiffness for what cage and land are made of; the radial clearance does not act on this model."""
-WARM, HOT = 303.15, 353.15
-"""Temperature of the oil [K], which sets its viscosity."""
-
-
-def bearing(name: str) -> tuple[jc.CageModel, dict[str, tuple[float, float]], tuple[float, float]]:
-    """A bearing, what may be changed in it and between which bounds [SI], and its range of cage speeds [rpm]."""
-    range_ = 4000.0, 27500.0
-    if name == "spindle":
-        model = read_bearing(HERE / "spindle.toml").model
-        ratio = float(model.bearing.cage_speed_ratio)
-        range_ = 4000.0 * ratio, 27500.0 * ratio
-        gap = 0.15e-3, 0.35e-3
-    else:
-        model, gap = jc.case(name), (0.30e-3, 0.60e-3)
-    now = {n: float(x) for n, x in jc.parameters(model).items()}
-    vary = {"guidance_gap": gap, "eccentricity": (5e-6, now["eccentricity"]), "temperature": (WARM, HOT)}
-    return model, vary | {n: (low * now[n], high * now[n]) for n, (low, high) in RELATIVE.items()}, range_
-
-
-def whole(space: DesignSpace, chaos: Chaos) -> AbstractObjective:
-    """Chaotic speeds, wear load and peak land force beside what the bearing itself has, and cost."""
-    each = (LandLoad(chaos.runs, name, LOADED) for name in ("wear load", "peak land force"))
-    loads = [relative(load, space.system, PRICE) for load in each]
-    return sum(loads, start=chaos) + PRICE * cost()
+LEDGER = pathlib.Path(__file__).parent / "pay.json"
+BUDGET, SEEDS, TOGETHER = 150, 5, 10
+"""Trials of a search, searches of each kind, and trials that CMA-ES and the surrogate ask for at a time."""
+WITHIN, OURS = 1.01, "with gradient"
+"""A cost over the least known one at which a search has reached it, and the name of the search of `design_for`."""
+RANGES = {"1a": (12500, 18000), "2a": (12000, 18000), "3a": (12500, 18500), "spindle": (1785, 6246)}
+"""Operating ranges [rpm of the cage]. Those of 1a to 3a lie between two unstable ranges, the given design breaks the
+margin at both ends. The spindle's is 4000 to 14000 rpm of its shaft."""
+OIL = 303.15, 353.15  # temperatures [K], which set the viscosity
+RELATIVE = {"land_width": (0.7, 1.5), "cage_mass": (0.8, 1.2), "rib_diameter": (0.98, 1.02), "amplitude": (0.7, 1.3)}
+RELATIVE |= {"stiffness": (0.5, 2.0)}
+"""Bounds over what the bearing has. The impact's amplitude stands for the pocket clearance, which acts through it, the
+contact's stiffness for the materials of cage and land."""
 
 
 class Case:
-    """A bearing with its objectives: that of the searches, and a finer one that judges what they found."""
+    """A bearing with its operating range, requirements and cost."""
 
     def __init__(self, name: str):
-        model, vary, range_ = bearing(name)
-        self.space = DesignSpace.of(model, vary)
-        self.objective = whole(self.space, chaotic_width(*range_, SPEEDS, discard=DISCARD, revolutions=REVOLUTIONS))
-        shift = 0.25 * (range_[1] - range_[0]) / (4 * SPEEDS)
-        inside = range_[0] + shift, range_[1] - shift
-        length: Any = dict(starts=3, discard=150, revolutions=100, method=jc.native(error=DEFAULT_ERROR / 4))
-        self.fine = whole(self.space, chaotic_width(*inside, 4 * SPEEDS, **length))
+        spindle = name == "spindle"
+        model = read_bearing(LEDGER.parent / "spindle.toml").model if spindle else jc.case(name)
+        now = {n: float(x) for n, x in jc.parameters(model).items()}
+        gap = (0.15e-3, 0.35e-3) if spindle else (0.30e-3, 0.60e-3)
+        vary = {"guidance_gap": gap, "eccentricity": (5e-6, now["eccentricity"]), "temperature": OIL}
+        space = DesignSpace.of(model, vary | {n: (low * now[n], high * now[n]) for n, (low, high) in RELATIVE.items()})
+        low, high = (rpm * np.pi / 30 for rpm in RANGES[name])
+        self.own = space.place.clip(0, 1)
+        self.range = OperatingRange(space, (low, high), Requirements().margin)
+        self.rest = listed(Requirements(), model), cost_function(None, model), np.ones(self.own.size, bool), {}
+        self.cost = self.problem().at(self.own).cost
+
+    def problem(self) -> CostProblem:
+        """The problem, with the edges of the given design only."""
+        return CostProblem(copy.deepcopy(self.range), *self.rest)
 
 
-class Spent(Exception):
-    """The search has had its designs."""
+class Ended(Exception):
+    """The search has spent its budget or reached what there is to be reached."""
 
 
 class Asked:
-    """The designs that one search has asked for, with their values and the time spent."""
+    """The trials of one search, with the time spent."""
 
-    def __init__(self, case: Case):
-        self.case, self.began = case, time.process_time()
-        self.places: list[np.ndarray] = []
-        self.found: list[float] = []
-        self.trace: list[tuple[float, float, float]] = []
-        """Designs, processor seconds, and the best so far, whenever there was a better one."""
+    def __init__(self, case: Case, until: float):
+        self.case, self.until, self.problem, self.began = case, until, case.problem(), time.process_time()
+        self.trace: list[tuple[int, float, float]] = []  # trials, seconds and cost of each cheaper feasible design
+        self.lost, self.compute, self.problem.compute = 0, self.problem.compute, self.tried
+
+    def tried(self, place: np.ndarray) -> Any:
+        """One trial, which is counted."""
+        if self.problem.evaluations >= BUDGET:
+            raise Ended
+        trial = self.compute(place)
+        self.lost += bool(trial.lost)
+        feasible = not trial.lost and np.min(trial.slack) >= -KEPT
+        if feasible and trial.cost < min((t[2] for t in self.trace), default=np.inf):
+            self.trace.append((self.problem.evaluations, round(time.process_time() - self.began, 1), trial.cost))
+            if trial.cost <= self.until:
+                raise Ended
+        return trial
 
     def values(self, places: np.ndarray) -> np.ndarray:
-        """The objective of some designs, ten at a time, as far as there is something left."""
-        rows = []
-        for first in range(0, len(places), TOGETHER):
-            part = np.asarray(places[first : first + TOGETHER])
-            if len(self.found) >= BUDGET:
-                raise Spent
-            filled = np.concatenate([part, np.repeat(part[-1:], TOGETHER - len(part), axis=0)])
-            value = self.case.objective.values(self.case.space, filled)[: len(part)]
-            value = np.where(np.isfinite(value), value, HOPELESS)
-            better = np.min(value) < min(self.found, default=np.inf)
-            self.places += list(part)
-            self.found += value.tolist()
-            if better:
-                self.trace.append((len(self.found), time.process_time() - self.began, float(np.min(value))))
-            rows.append(value)
-        return np.concatenate(rows)
+        """The objective of searches without derivatives."""
+        return np.array([self.problem.priced(self.problem.at(place), self.case.cost) for place in places])
 
 
-def by_cma(asked: Asked, start: np.ndarray, seed: int) -> None:
-    """CMA-ES from the design itself."""
+def with_gradient(asked: Asked, seed: int) -> None:
+    """As `design_for`, from the given design or from one of its other first designs."""
+    begins = [asked.case.own, *sobol(asked.case.own.size, SEEDS, 0)]
+    SEARCHES["slsqp"](asked.problem, begins[seed], lambda done: None)
+
+
+def by_cma(asked: Asked, seed: int) -> None:
+    """CMA-ES from the given design."""
     options = dict(bounds=[0, 1], seed=seed + 1, popsize=TOGETHER, verbose=-9)
-    search = cma.CMAEvolutionStrategy(start, 0.3, options)
+    search = cma.CMAEvolutionStrategy(asked.case.own.clip(0.02, 0.98), 0.3, options)
     while True:
         places = search.ask()
         search.tell(places, asked.values(np.array(places)).tolist())
 
 
-def by_evolution(asked: Asked, start: np.ndarray, seed: int) -> None:
-    """Differential evolution of 20 designs, among them the design itself."""
-    first = qmc.LatinHypercube(len(start), rng=seed).random(2 * TOGETHER)
-    first[0] = asked.case.space.place.clip(0, 1)
-    differential_evolution(
-        lambda x: asked.values(x.T),
-        [(0, 1)] * len(start),
-        init=first,  # pyright: ignore[reportArgumentType]
-        vectorized=True,
-        updating="deferred",
-        maxiter=BUDGET,
-        polish=False,
-        tol=0,
-        rng=seed,
-    )
+def by_evolution(asked: Asked, seed: int) -> None:
+    """Differential evolution of 20 designs, among them the given one."""
+    first = qmc.LatinHypercube(asked.case.own.size, rng=seed).random(2 * TOGETHER)
+    first[0] = asked.case.own
+    value, given = lambda x: float(asked.values(x[None])[0]), dict[str, Any](init=first, polish=False, tol=0, rng=seed)
+    differential_evolution(value, [(0, 1)] * asked.case.own.size, maxiter=BUDGET, **given)
 
 
-def by_surrogate(asked: Asked, start: np.ndarray, seed: int) -> None:
-    """As `jaxcage design`: a Gaussian process of what was found chooses ten designs at a time."""
-    search = SurrogateSearch(start, TOGETHER, (seed, 0))
+def by_surrogate(asked: Asked, seed: int) -> None:
+    """The package's search by a Gaussian process, from the given design."""
+    search = SurrogateSearch(asked.case.own, TOGETHER, seed)
     while True:
         places = search.ask()
         search.tell(places, asked.values(places))
 
 
-def as_it_is(asked: Asked, start: np.ndarray, seed: int) -> None:
-    """The bearing itself."""
-    asked.values(asked.case.space.place[None].clip(0, 1))
-
-
-SEARCHES: dict[str, Callable[[Asked, np.ndarray, int], None]] = {
+KINDS: dict[str, Callable[[Asked, int], None]] = {
+    OURS: with_gradient,
     "CMA-ES": by_cma,
-    "differential evolution": by_evolution,
     "surrogate": by_surrogate,
+    "differential evolution": by_evolution,
 }
+Ledger = Sequence[dict[str, Any]]
 
 
-def searched(case: Case, bearing: str, name: str, seed: int) -> dict[str, Any]:
-    """One search and the check of what it found, as the ledger has it; `none` is the bearing as it is."""
-    asked = Asked(case)
+def searched(case: Case, name: str, kind: str, seed: int, least: float) -> dict[str, Any]:
+    """One search, as the ledger has it."""
+    asked = Asked(case, -np.inf if kind == OURS else WITHIN * least)
     try:
-        SEARCHES.get(name, as_it_is)(asked, case.space.place.clip(0.02, 0.98), seed)
-    except Spent:
+        KINDS[kind](asked, seed)
+    except Ended:
         pass
-    seconds = time.process_time() - asked.began
-    at = asked.places[int(np.argmin(asked.found))]
-    return {
-        "bearing": bearing,
-        "search": name,
-        "seed": seed,
-        "lane_revolutions": len(asked.found) * LANE_REVOLUTIONS,
-        "seconds": round(seconds, 1),
-        "best": round(min(asked.found), 1),
-        "trace": [(count, round(when, 1), round(value, 1)) for count, when, value in asked.trace],
-        "place": [round(float(x), 4) for x in at],
-        "check": {"value": round(float(case.fine.values(case.space, at[None])[0]), 3)},
-    }
+    tried = {"evaluations": asked.problem.evaluations, "lost": asked.lost, "trace": asked.trace}
+    seconds = round(time.process_time() - asked.began, 1)
+    return {"case": name, "search": kind, "seed": seed, "cost0": case.cost, "seconds": seconds, **tried}
 
 
-def best_after(trace: Sequence[Sequence[float]], designs: float) -> float:
-    """The lowest value that a search had seen after so many designs; NaN before its first batch."""
-    return min((value for count, _, value in trace if count <= designs), default=float("nan"))
+def least_cost(ledger: Ledger, case: str) -> float:
+    """The lowest feasible cost that any search found."""
+    return min((r["trace"][-1][2] for r in ledger if r["case"] == case and r["trace"]), default=-np.inf)
 
 
-def designs_until(trace: Sequence[Sequence[float]], value: float) -> float:
-    """After how many designs a search had seen a value as low; infinity for never."""
-    return next((float(count) for count, _, found in trace if found <= value), float("inf"))
+def reached(run: dict[str, Any], least: float) -> tuple[float, float]:
+    """Trials and processor seconds until a search was within 1 % of a cost; infinity for never."""
+    return next(((n, s) for n, s, cost in run["trace"] if cost <= WITHIN * least), (np.inf, np.inf))
 
 
-def to_be_reached(runs: Sequence[dict[str, Any]]) -> float:
-    """The rivals' best: of each the median of its seeds, of these the lower."""
-    of = lambda name: [r["best"] for r in runs if r["search"] == name]
-    return min((float(np.median(of(name))) for name in RIVALS if of(name)), default=float("nan"))
-
-
-def table(ledger: Sequence[dict[str, Any]]) -> str:
-    """The table of results: medians over seeds for each bearing and search, with lowest and highest in brackets."""
-    parts = []
-    for bearing in dict.fromkeys(r["bearing"] for r in ledger):
-        of = [r for r in ledger if r["bearing"] == bearing]
-        runs, own = [r for r in of if r["search"] != "none"], next(r for r in of if r["search"] == "none")
-        goal = to_be_reached(runs)
-        head = (
-            f"{bearing}: {own['best']:.0f} rpm as it is, {own['check']['value']:.0f} by the finer check; "
-            f"to be reached: {goal:.0f}"
-        )
-        names = dict.fromkeys(r["search"] for r in runs)
-        rows = [_row(name, [r for r in runs if r["search"] == name], goal) for name in names]
-        parts.append(f"{head}\n{columns([HEAD, *rows], right=True)}")
-    return "\n\n".join(parts)
-
-
-def _row(name: str, runs: Sequence[dict[str, Any]], goal: float) -> list[str]:
-    until = np.array([designs_until(r["trace"], goal) for r in runs])
-    median = float(np.sort(until)[(len(until)) // 2])
-    reached = f"{int(np.sum(np.isfinite(until)))} of {len(until)}" + ("" if np.isinf(median) else f": {median:.0f}")
-    spread = lambda values: f"{np.median(values):.0f} ({np.min(values):.0f} to {np.max(values):.0f})"
-    return [
-        name,
-        str(len(runs)),
-        spread([best_after(r["trace"], SHORT) for r in runs]),
-        spread([r["best"] for r in runs]),
-        spread([r["check"]["value"] for r in runs]),
-        reached,
-        f"{np.median([r['lane_revolutions'] for r in runs]) / 1e6:.2f}",
-        f"{np.median([r['seconds'] for r in runs]):.0f}",
-    ]
+def table(ledger: Ledger) -> str:
+    """Medians over seeds for each case and search, and those of the best rival over ours."""
+    parts: list[str] = []
+    for case in dict.fromkeys(r["case"] for r in ledger):
+        of, least = [r for r in ledger if r["case"] == case], least_cost(ledger, case)
+        rows, medians = [["search", "seeds", "reached", "trials", "processor s", "least cost", "s a trial"]], {}
+        for kind in dict.fromkeys(r["search"] for r in of):
+            runs = [r for r in of if r["search"] == kind]
+            each = [reached(r, least) for r in runs]
+            at = medians[kind] = [float(np.sort(x)[len(x) // 2]) for x in zip(*each, strict=True)]
+            costs = sorted(r["trace"][-1][2] if r["trace"] else np.inf for r in runs)
+            shown = [f"{x:.0f}" if np.isfinite(x) else "never" for x in at]
+            count = f"{sum(np.isfinite(x[0]) for x in each)} of {len(runs)}"
+            pace = sum(r["seconds"] for r in runs) / sum(r["evaluations"] for r in runs)
+            rows.append([kind, str(len(runs)), count, *shown, f"{costs[len(costs) // 2]:.4f}", f"{pace:.1f}"])
+        known = f"cost {of[0]['cost0']:.4f} as it is, least known {least:.4f}"
+        parts.append(f"{case}, {RANGES[case]} rpm: {known}\n{columns(rows, right=True)}\n")
+        ours = medians.pop(OURS, [np.inf] * 2)
+        if medians and np.isfinite(ours[0]):
+            ratio = [min(m[i] for m in medians.values()) / ours[i] for i in (0, 1)]
+            known = f"{ratio[0]:.1f} in trials, {ratio[1]:.1f} in processor time"
+            known = known if np.isfinite(ratio[0]) else f"above {BUDGET / ours[0]:.1f} in trials"
+            parts[-1] += f"best rival over ours: {known}\n"
+    return "\n".join(parts).rstrip()
 
 
 def main() -> None:
     """Read the options, run what the ledger does not have, print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bearing", nargs="*", default=BEARINGS, choices=BEARINGS)
-    parser.add_argument("--search", nargs="*", default=list(SEARCHES), choices=list(SEARCHES))
+    parser.add_argument("--case", nargs="*", default=list(RANGES), choices=list(RANGES))
     parser.add_argument("--seeds", type=int, default=SEEDS)
-    parser.add_argument("--ledger", type=pathlib.Path, default=LEDGER)
     parser.add_argument("--table", action="store_true", help="run nothing")
     given = parser.parse_args()
     jc.enable_x64()
     jc.keep_compiled_programs()
-    ledger = json.loads(given.ledger.read_text(encoding="utf-8")) if given.ledger.exists() else []
-    wanted = [(b, "none", 0) for b in given.bearing]
-    wanted += [(b, s, seed) for seed in range(given.seeds) for b in given.bearing for s in given.search]
+    ledger = json.loads(LEDGER.read_text(encoding="utf-8"))
+    wanted = [(c, OURS, seed) for c in given.case for seed in range(given.seeds)]
+    wanted += [(c, k, seed) for seed in range(given.seeds) for c in given.case for k in KINDS if k != OURS]
+    wanted.sort(key=lambda w: (w[2] if w[1] != OURS else 0, given.case.index(w[0])))
     of = functools.cache(Case)
-    for bearing, name, seed in wanted if not given.table else ():
-        if any((r["bearing"], r["search"], r["seed"]) == (bearing, name, seed) for r in ledger):
+    for case, kind, seed in wanted if not given.table else ():
+        least, this = least_cost(ledger, case), (case, kind, seed)
+        same = [r for r in ledger if (r["case"], r["search"], r["seed"]) == this]
+        if any(kind == OURS or r["evaluations"] >= BUDGET or np.isfinite(reached(r, least)[0]) for r in same):
             continue
-        case = of(bearing)
-        as_it_is(Asked(case), case.space.place, 0)  # compiles
-        ledger.append(searched(case, bearing, name, seed))
-        lines = ",\n".join(json.dumps(r) for r in ledger)
-        given.ledger.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
-        print(f"{bearing}, {name}, seed {seed}: {ledger[-1]['best']:.0f}", flush=True)
+        ledger = [r for r in ledger if r not in same] + [searched(of(case), case, kind, seed, least)]
+        LEDGER.write_text("[\n" + ",\n".join(map(json.dumps, ledger)) + "\n]\n", encoding="utf-8")
+        print(f"{case} {kind} {seed}: {ledger[-1]['evaluations']} trials, {ledger[-1]['trace'][-1:]}", flush=True)
     print(table(ledger))
 
 

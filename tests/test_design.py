@@ -3,7 +3,8 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import WELL, double_well
+from helpers import WELL, DoubleWell, double_well
+from literature import DUFFING_FOLDS
 
 import jaxcage as jc
 
@@ -164,3 +165,14 @@ def test_loads_of_the_land_are_those_of_a_time_history():
         assert got["least film"][lane] == pytest.approx(thinnest, abs=0.01 * float(model.clearance))
         touched += load > 1.0
     assert touched >= 2
+
+
+@pytest.mark.wide
+def test_orbits_past_a_fold_are_none_of_the_operating_range():
+    system = jc.ForcedOscillator(DoubleWell(1.0, 0.1, -1.0, 1.0, 0.3), coordinates=1)
+    space = jc.design.DesignSpace.of(system, {"damping": (0.05, 0.2)})
+    range_ = jc.design.OperatingRange(space, (1.1, 1.7), margin=10.0)
+    edges = range_.edges(space.place)
+    assert not isinstance(edges, str) and edges["upper"] is not None and not range_.handed_over
+    assert edges["upper"].value_rpm == pytest.approx(DUFFING_FOLDS["up"].value * 30 / np.pi, rel=1e-6)
+    assert range_.peak(space.place, edges).value < 1

@@ -294,7 +294,8 @@ class OperatingRange:
             if orbit is not None and not low < float(orbit.speed) < high:
                 orbit = None
             given = {"lower": low, "upper": high, "method": self.method}
-            self._through[key] = None if orbit is None else branch(self.space.model(place), orbit, **given)
+            found = None if orbit is None else branch(self.space.model(place), orbit, **given)
+            self._through[key] = found if found is None or orbit is None else _between_folds(found, orbit)
         return self._through[key]
 
     def _between(self, through: Branch, edges: Mapping[str, Sensitivity | None]) -> tuple[np.ndarray, np.ndarray]:
@@ -396,6 +397,20 @@ READ = "land force", "drag", "film"
 
 def _clearance(model: Any) -> Any:
     return model.clearance
+
+
+def _between_folds(found: Branch, orbit: Orbit) -> Branch:
+    """The part of a branch about one of its orbits in which the speed rises or falls throughout: past a fold there are
+    other orbits at the same speeds."""
+    size = float(orbit.speed), np.asarray(orbit.state)
+    away = np.abs(found.speed / size[0] - 1) + np.linalg.norm(found.state - size[1], axis=1) / np.linalg.norm(size[1])
+    rises = np.diff(found.speed) > 0
+    here = min(int(np.argmin(away)), rises.size - 1)
+    turns = np.flatnonzero(rises != rises[here])
+    first = int(np.max(turns[turns < here], initial=-1)) + 1
+    last = int(np.min(turns[turns > here], initial=rises.size)) + 1
+    arrays = ("value", "speed", "state", "multipliers", "stable", "steps", "error")
+    return dataclasses.replace(found, **{name: getattr(found, name)[first:last] for name in arrays})
 
 
 def _state_at(through: Branch, speed: float) -> np.ndarray:

@@ -133,6 +133,11 @@ class _Problem(abc.ABC):
             self.trials[key] = self.compute(place)
         return self.trials[key]
 
+    def priced(self, trial: Trial, size: float) -> float:
+        """The cost over a size, and what the worst requirement falls short at its price: one number to be made small,
+        also for a search without derivatives."""
+        return trial.cost / size + PENALTY * max(0.0, -float(np.min(trial.slack, initial=np.inf)))
+
     def nowhere(self, place: np.ndarray, cost: float, slope: np.ndarray, why: str) -> Trial:
         """A trial at which an edge is lost."""
         m, n = len(self.wanted), place.size
@@ -150,8 +155,11 @@ class _Problem(abc.ABC):
         return place
 
 
-class _CostProblem(_Problem):
-    """Requirements over an operating range, and a cost that is cheap to compute."""
+class CostProblem(_Problem):
+    """Requirements over an operating range, and a cost that is cheap to compute.
+
+    **Arguments:** operating range; requirements; cost; parameters that vary; tolerances.
+    """
 
     def __init__(
         self,
@@ -295,7 +303,7 @@ def design_for(
         problem: _Problem = _WidthProblem(UnstableWidth(space, operating, method), keep, free)
     else:
         range_ = OperatingRange(space, operating, keep.margin, method)
-        problem = _CostProblem(range_, listed(keep, model), cost_function(cost, model), free, tolerance)
+        problem = CostProblem(range_, listed(keep, model), cost_function(cost, model), free, tolerance)
     own = np.where(free, np.clip(space.place, 0, 1), space.place)
     count = int(free.sum())
     places = [own] + [problem.whole(x, own) for x in sobol(count, max(starts, 2), seed)[: starts - 1]]
@@ -325,15 +333,13 @@ def _programme(problem: _Problem, begin: np.ndarray, say: Callable[[int], None])
     """
     trial, radius, largest = problem.at(begin), FIRST_RADIUS, LARGEST_RADIUS
     size = max(abs(trial.cost), 1e-12)
-    short = lambda t: max(0.0, -float(np.min(t.slack, initial=np.inf)))
-    merit = lambda t: t.cost / size + PENALTY * short(t)
     for turn in range(ITERATIONS):
         step, foreseen = _step(problem, trial, radius, size)
-        gain = merit(trial) - foreseen
+        gain = problem.priced(trial, size) - foreseen
         if gain < ACCURACY or radius < LEAST_RADIUS:
             break
         new = problem.at(problem.whole(trial.place[problem.free] + step, begin))
-        kept = (merit(trial) - merit(new)) / gain
+        kept = (problem.priced(trial, size) - problem.priced(new, size)) / gain
         if kept < 0.25 or new.lost:
             radius = min(radius, float(np.max(np.abs(step)))) / 2
             largest = radius / 2 if new.lost else largest  # after this step a longer one would lose the edge again
