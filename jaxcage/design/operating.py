@@ -361,7 +361,8 @@ class OperatingRange:
 
     def _largest(self, through: Branch, place: np.ndarray, name: str, low: float, high: float) -> Orbit:
         """The orbit between two speeds at which a quantity is largest, its speed to `WORST_AT`."""
-        minus = lambda speed: -self._size(place, self._orbit_at(through, place, float(speed)), name)
+        size = lambda speed: self._size(place, self._orbit_at(through, place, float(speed)), name)
+        minus = lambda speed: -float(np.nan_to_num(size(speed), neginf=0.0))
         options = {"xatol": WORST_AT * high}
         found = minimize_scalar(minus, bounds=(low, high), method="bounded", options=options)
         return self._orbit_at(through, place, float(found.x))

@@ -433,7 +433,7 @@ def _conflict(problem: _Problem, trial: Trial, names: list[str]) -> tuple[str, .
     return (*against, *(f"the bound of {n}" for n, w in zip(names, bounds, strict=False) if w > 1e-3 * size))
 
 
-def _budget(problem: _CostProblem, trial: Trial, tolerance: Mapping[str, Tolerance]) -> list[Budget]:
+def _budget(problem: CostProblem, trial: Trial, tolerance: Mapping[str, Tolerance]) -> list[Budget]:
     """How wide each tolerance may be while the others stay: foreseen at first order, then solved for at the corners,
     and less wide until all requirements hold there."""
     rows = []
@@ -488,7 +488,7 @@ def _described(
         prices=prices,
         at_bound=tuple(n for n, v in zip(names, x, strict=True) if min(v, 1 - v) < AT_BOUND),
         worst=trial.worst,
-        budget=_budget(problem, trial, tolerance) if isinstance(problem, _CostProblem) and feasible else [],
+        budget=_budget(problem, trial, tolerance) if isinstance(problem, CostProblem) and feasible else [],
         stopped_by=_stop(problem, best),
         notes=tuple(dict.fromkeys(problem.notes)),
         evaluations=problem.evaluations,
