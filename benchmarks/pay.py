@@ -43,8 +43,8 @@ BUDGET, SEEDS, TOGETHER = 150, 5, 10
 WITHIN, OURS = 1.01, "with gradient"
 """A cost over the least known one at which a search has reached it, and the name of the search of `design_for`."""
 RANGES = {"1a": (12500, 18000), "2a": (12000, 18000), "3a": (12500, 18500), "spindle": (1785, 6246)}
-"""Operating ranges [rpm of the cage]. Those of 1a to 3a lie between two unstable ranges, the given design breaks the
-margin at both ends. The spindle's is 4000 to 14000 rpm of its shaft."""
+"""Operating ranges [rpm of the cage]. Those of 1a to 3a take the calm speeds between two unstable ranges, and less
+than the margin is left at both ends of the given design. The spindle's is 4000 to 14000 rpm of its shaft."""
 OIL = 303.15, 353.15  # temperatures [K], which set the viscosity
 RELATIVE = {"land_width": (0.7, 1.5), "cage_mass": (0.8, 1.2), "rib_diameter": (0.98, 1.02), "amplitude": (0.7, 1.3)}
 RELATIVE |= {"stiffness": (0.5, 2.0)}
@@ -169,7 +169,7 @@ def table(ledger: Ledger) -> str:
     """Medians over seeds for each case and search, and those of the best rival over ours."""
     parts: list[str] = []
     for case in dict.fromkeys(r["case"] for r in ledger):
-        of, least = [r for r in ledger if r["case"] == case], least_cost(ledger, case)
+        of, least, (low, high) = [r for r in ledger if r["case"] == case], least_cost(ledger, case), RANGES[case]
         rows, medians = [["search", "seeds", "reached", "trials", "processor s", "least cost", "s a trial"]], {}
         for kind in dict.fromkeys(r["search"] for r in of):
             runs = [r for r in of if r["search"] == kind]
@@ -181,7 +181,7 @@ def table(ledger: Ledger) -> str:
             pace = sum(r["seconds"] for r in runs) / sum(r["evaluations"] for r in runs)
             rows.append([kind, str(len(runs)), count, *shown, f"{costs[len(costs) // 2]:.4f}", f"{pace:.1f}"])
         known = f"cost {of[0]['cost0']:.4f} as it is, least known {least:.4f}"
-        parts.append(f"{case}, {RANGES[case]} rpm: {known}\n{columns(rows, right=True)}\n")
+        parts.append(f"{case}, {low} to {high} rpm: {known}\n{columns(rows, right=True)}\n")
         ours = medians.pop(OURS, [np.inf] * 2)
         if medians and np.isfinite(ours[0]):
             ratio = [min(m[i] for m in medians.values()) / ours[i] for i in (0, 1)]
