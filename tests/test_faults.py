@@ -96,7 +96,7 @@ def test_a_study_on_a_full_disk_goes_on(tmp_path: Path):
     system = jc.ForcedOscillator(_duffing, coordinates=1)
     length = dict(discard=10, revolutions=10, blocks=5, exponents=1, confirm=False, horizon=0)
     run = Run.of(system, method=jc.method("rk4", steps=32), **length)
-    study = Study(system, grid, run, 0, "duffing", "1")
+    study = Study(system, grid, run, "duffing", "1")
     run_study(study, tmp_path / "whole.zarr")
     store = tmp_path / "study.zarr"
     with full_disk(100), pytest.raises(OSError, match=r"not be written to \(File too large\).* goes on from there"):

@@ -104,6 +104,13 @@ def test_rodas4_is_l_stable():
     assert np.log2(error / half) == pytest.approx(5, abs=0.15)
 
 
+def test_rodas4_integrates_cubic_polynomials_exactly():
+    """To rounding: a wrong digit in a coefficient leaves an error that no number of steps reduces."""
+    field = FirstOrderField(lambda tau, y: (1 + 2 * tau + 3 * tau**2 + 4 * tau**3,), 1.0)
+    (end,), *_ = rosenbrock_step(field, 0.0, lambda _: 1.0, (jnp.zeros(()),))
+    assert float(end) == pytest.approx(4, abs=1e-13)
+
+
 # --- the cage --------------------------------------------------------------------------------
 
 CAGE, SPEED = case("1a", "preliminary"), 15000 * np.pi / 30
