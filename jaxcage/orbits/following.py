@@ -26,7 +26,7 @@ from .step_lengths import Points, StepControl
 
 
 SHARE = "share"
-LONGEST, SHORTEST, MOST = 1.5, 1e-4, 40
+LONGEST, SHORTEST, MOST = 1.5, 1e-6, 80
 """Longest and shortest step, in clearances and tenths of the speed and of the largest relative change; most steps."""
 SAME_DESIGN = 1e-9  # designs nearer than this have the same edge but for the last steps of Newton's method
 SAME_EDGE = 2e-3
