@@ -129,7 +129,7 @@ def main() -> None:
                 count[said] += 1
                 if said == "followed":
                     edges = (sensitivity(other, p).value_rpm for p in fresh.values() if same(found.edge, p))
-                    differs = max(differs, *(abs(e / found.edge.value_rpm - 1) for e in edges))
+                    differs = max(differs, *(abs(e / found.edge.value_rpm - 1) for e in edges))  # pyright: ignore
                 elif said == "fault":
                     there = [f"{p.kind} at {float(p.speed_rpm):.3f}" for p in fresh.values()]
                     about = f"{end} {point.kind} at {float(point.speed_rpm):.3f}"

@@ -16,7 +16,6 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import jaxcage as jc
-from jaxcage.design import DesignSpace, OperatingRange, Price, Requirements, Tolerance
 from jaxcage.forces import parameter
 from jaxcage.orbits import follow, stable_range
 

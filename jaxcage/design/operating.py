@@ -311,7 +311,19 @@ class OperatingRange:
     def _stable_between(self, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> bool:
         """Whether the orbits between the edges are stable, as far as the margins reach."""
         through = self.through(place)
-        return through is None or bool(np.all(self._between(through, edges)[1] < 1))
+        if through is None:
+            return True
+        if np.any(self._between(through, edges)[1] >= 1):
+            return False
+        for name, end, sign in (("lower", self.wider[0], 1.0), ("upper", self.wider[1], -1.0)):
+            edge = edges[name]
+            if (
+                edge is None or sign * (end - edge.value_rpm * np.pi / 30) > BESIDE * end
+            ):  # the edge is beyond the margin
+                orbit = self._orbit_at(through, place, end)
+                if bool(orbit.converged) and float(np.abs(orbit.multipliers[0])) >= 1:
+                    return False
+        return True
 
     def peak(self, place: Float[np.ndarray, " n"], edges: Mapping[str, Sensitivity | None]) -> Value:
         """The largest multiplier at a maximum between the edges: where it passes 1, a new unstable range is born."""
