@@ -17,7 +17,7 @@
 from _size import save, small
 
 
-POINTS, STATES = small(9, 3), small(16, 3)
+POINTS, STATES = small(7, 3), small(16, 3)
 
 # %%
 import matplotlib.pyplot as plt

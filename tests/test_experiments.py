@@ -25,7 +25,7 @@ def code_cells(name: str) -> list[dict]:
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("name", [name for name in NAMES if name != "optimise_gap_and_balance"])  # it is rewritten
+@pytest.mark.parametrize("name", NAMES)
 def test_experiment(name: str, tmp_path: pathlib.Path):
     script = EXPERIMENTS / f"{name}.py"
     path = os.pathsep.join([str(EXPERIMENTS.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
