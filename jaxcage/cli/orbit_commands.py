@@ -221,7 +221,7 @@ def _of_means(
         notes.append(f"Not settled, so that more --discard may change it: {', '.join(drifting)}")
     if absent := [n for n, g in each if not np.any(g.value)]:
         notes.append(f"Zero in every run: {', '.join(absent)}")
-    counts = {n: getattr(found, n) for n in ("pairs", "failed", "inaccurate")} | {"spread": given["spread"]}
+    counts = {n: getattr(found, n) for n in ("pairs", "failed", "inaccurate")}
     document = subject.both(at) | length | counts
     files = {"figure": (f"_{means.speed:g}rpm.png", jc.show.statistic_bars(found, title))}
     return Answer(said, jc.show.mean_gradient_tables(title, found), notes, document, subject, files)
