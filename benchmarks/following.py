@@ -5,9 +5,11 @@ per cent. The edges of the stable range around that speed are followed to the ch
 searches without hints. An edge is
 
 - `followed`, if the search finds it, too: the same kind at the same speed to 1e-5;
-- `ended`, if following says why (`turned back`, `left the range`), and no edge that the search finds leads back to it;
+- `ended`, if following says why (`turned back`, `left the range`, `neutral saddle`), and no edge that the search finds
+    leads back to it;
 - `handed over`, if it was followed to a bifurcation of an unstable orbit: another edge bounds the range now;
-- `missed`, if stable orbits end there, in a range that the search without hints does not find;
+- `missed`, if stable orbits end there by its multipliers, and it leads back to the edge from which it was followed: the
+    search found another stable range, or none;
 - a fault in any other case: it is lost, or is there and was not followed.
 """
 
@@ -62,21 +64,8 @@ def same(edge: Sensitivity, point: Point) -> bool:
     return edge.kind == point.kind and abs(edge.value_rpm / float(point.speed_rpm) - 1) < SAME
 
 
-def bounds(model: jc.CageModel, name: str, edge: Sensitivity, limits: tuple[float, float]) -> bool:
-    """Whether a search that begins beside an edge finds that stable orbits end there."""
-    assert edge.state is not None
-    speed, inwards = edge.value_rpm * np.pi / 30, 1 if name == "lower" else -1
-    for distance in (1e-4, 1e-3, 1e-2):
-        beside = speed * (1 + distance * inwards)
-        found = stable_range(model, (min(speed, beside), max(speed, beside)), limits, [(edge.state, beside)])
-        if any(same(edge, point) for point in edges_of(found).values()):
-            return True
-    return False
-
-
 def verdict(
     models: tuple[jc.CageModel, jc.CageModel],
-    name: str,
     point: Point,
     limits: tuple[float, float],
     fresh: dict[str, Point],
@@ -84,19 +73,21 @@ def verdict(
 ) -> str:
     """What became of an edge (see the head of this file)."""
     model, other = models
-    if found.edge is not None:
-        if any(same(found.edge, p) for p in fresh.values()):
-            return "followed"
-        if not found.edge.bounds:
-            return "handed over"
-        return "missed" if bounds(other, name, found.edge, limits) else "fault"
+
+    def leads_back(reached: Point) -> bool:
+        back = follow(other, reached, model, lower=limits[0], upper=limits[1]).edge
+        return back is not None and same(back, point)
+
     if found.ended == "lost":
         return "fault"
-    for rival in fresh.values():
-        back = follow(other, rival, model, lower=limits[0], upper=limits[1]).edge if rival.kind == point.kind else None
-        if back is not None and same(back, point):
-            return "fault"
-    return "ended"
+    if (edge := found.edge) is None:
+        return "fault" if any(leads_back(p) for p in fresh.values() if p.kind == point.kind) else "ended"
+    if any(same(edge, p) for p in fresh.values()):
+        return "followed"
+    if not edge.bounds:
+        return "handed over"
+    assert edge.state is not None
+    return "missed" if leads_back(Point(edge.kind, jc.rpm(edge.value_rpm), edge.state, steps=edge.steps)) else "fault"
 
 
 def main() -> None:
@@ -125,7 +116,7 @@ def main() -> None:
                 began = time.perf_counter()
                 found = follow(model, point, other, lower=limits[0], upper=limits[1], name=end)
                 spent += time.perf_counter() - began
-                said = verdict((model, other), end, point, limits, fresh, found)
+                said = verdict((model, other), point, limits, fresh, found)
                 count[said] += 1
                 if said == "followed":
                     edges = (sensitivity(other, p).value_rpm for p in fresh.values() if same(found.edge, p))
@@ -134,7 +125,7 @@ def main() -> None:
                     there = [f"{p.kind} at {float(p.speed_rpm):.3f}" for p in fresh.values()]
                     about = f"{end} {point.kind} at {float(point.speed_rpm):.3f}"
                     print(f"  {about}: {found.ended or found.edge.value_rpm} at share {found.share:.3f}; {there}")
-                    print(f"    change {done}, factors {factors.round(4).tolist()}", flush=True)
+                    print(f"    {name}, change {done}, factors {factors.round(4).tolist()}", flush=True)
         row = "".join(f"{count[v]:13d}" for v in VERDICTS) + f"{spent / max(count.total(), 1):13.2f}"
         print(f"{name:14}{row}", flush=True)
         total += count

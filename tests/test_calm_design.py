@@ -4,44 +4,46 @@ Gradients stand beside differences of solutions by SciPy's DOP853 and Newton's m
 this library. "Planted" systems have edges, and so optima, that are known exactly.
 """
 
-import functools
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import wide_but
-from scipy.integrate import solve_ivp
-from scipy.optimize import fsolve
+from shooting import edge_speed, orbit, readings
 
 import jaxcage as jc
+from jaxcage.design import DesignSpace, OperatingRange, Price, Requirements, Tolerance
 from jaxcage.forces import parameter
 from jaxcage.orbits import follow, stable_range
 
 
+pytestmark = pytest.mark.wide  # minutes, most of them compilation
+
+
 class Window(eqx.Module):
-    """The orbit (cos, sin) with the multipliers -exp(g T) and -exp((g - 1) T), in a frame that turns by half a
-    revolution; g = k ((w - x)(w - x - y) - d) vanishes at the edges of a range of the speed w, where the period
-    doubles: x and x + y without d."""
+    """The orbit (cos, sin) with the multipliers -exp((g + l) T), l = -s/2 +- sqrt(s^2/4 + r): l is 0 and -1 without r.
+    g = k ((w - x)(w - x - y) - d) then vanishes where the period doubles, at the speeds x and x + y without d."""
 
     x: jax.Array = parameter("1", -9.0, 9.0, "first edge")
     y: jax.Array = parameter("1", -9.0, 9.0, "distance of both edges")
     d: jax.Array = parameter("1", -9.0, 9.0, "shift of the parabola")
     k: jax.Array = parameter("1", -9.0, 9.0, "bend of the parabola")
+    s: jax.Array = parameter("1", -9.0, 9.0, "sum of both rates")
+    r: jax.Array = parameter("1", -9.0, 9.0, "coupling")
 
     def __call__(self, tau, y, speed):
         growth = self.k * ((speed - self.x) * (speed - self.x - self.y) - self.d)
         cos, sin, half, side = jnp.cos(tau), jnp.sin(tau), jnp.cos(tau / 2), jnp.sin(tau / 2)
         a, b = y[0] - cos, y[1] - sin
         e, f = half * a + side * b, -side * a + half * b
-        de, df = (growth - e * e - f * f) * e, (growth - 1 - e * e - f * f) * f
+        de, df = (growth - e * e - f * f) * e + self.r * f, (growth - self.s - e * e - f * f) * f + e
         turn = speed / 2
         return (half * de - side * df - turn * b - speed * sin, side * de + half * df + turn * a + speed * cos)
 
 
-def window(x=1.0, y=1.5, d=0.0, k=0.5):
-    return jc.ForcedSystem(Window(x=x, y=y, d=d, k=k), dimension=2)
+def window(x=1.0, y=1.5, d=0.0, k=0.5, s=1.0, r=0.0):
+    return jc.ForcedSystem(Window(x=x, y=y, d=d, k=k, s=s, r=r), dimension=2)
 
 
 OPERATING, LIMITS = (1.2, 2.0), (0.6, 4.0)
@@ -76,10 +78,26 @@ def test_an_edge_that_meets_the_other_turns_back(planted, end):
     assert found.share == pytest.approx(0.5625, abs=5e-3)
 
 
+def test_a_change_within_rounding(planted):
+    found = follow(window(), planted.lower, window(x=1 + 4e-16), lower=0.6, upper=4.0)
+    assert found.edge.value_rpm * np.pi / 30 == pytest.approx(1.0, rel=1e-7)
+
+
 def test_an_edge_that_leaves_the_range(planted):
     """The lower edge passes 0.8 at 0.4 of the way."""
     found = follow(window(), planted.lower, window(x=0.5, y=2.0), lower=0.8, upper=4.0)
     assert found.edge is None and found.ended == "left the range" and 0.4 <= found.share < 1
+
+
+def test_a_torus_bifurcation_that_becomes_a_neutral_saddle():
+    """Without s the multipliers are a pair for r < 0 and real for r > 0: no edge any more, and without sensitivity."""
+    before, other = window(s=0.0, r=-0.04), window(x=1.1, s=0.0, r=0.04)
+    point = stable_range(before, OPERATING, LIMITS).lower
+    near = follow(before, point, window(x=1.1, s=0.0, r=-0.01), lower=0.6, upper=4.0).edge
+    assert near.kind == "Neimark-Sacker" and near.value_rpm * np.pi / 30 == pytest.approx(1.1, rel=1e-7) and near.bounds
+    assert follow(before, point, other, lower=0.6, upper=4.0)[:2] == (None, "neutral saddle")
+    lost = jc.sensitivity(other, jc.Point("Neimark-Sacker", 1.1, np.array([1.0, 0.0])))
+    assert lost.status == "other kind" and np.isnan(lost.value_rpm)
 
 
 CASE = jc.case("1a")
@@ -107,81 +125,166 @@ def test_the_fold_of_a_cage_is_followed(given, change):
 # --- gradients ------------------------------------------------------------------------------------------------------
 
 
-@functools.partial(jax.jit, static_argnums=0)
-def _rates(form, leaves, speed, tau, row):
-    """Rates of the state and of its derivatives by the first state, in units of the scale."""
-    model = jax.tree.unflatten(form, leaves)
-    field, scale = model.at_speed(speed), jnp.stack(model.scale(speed))
-    f = lambda z: jnp.stack(field(tau, tuple(z * scale))) / scale
-    return jnp.concatenate([f(row[:4]), (jax.jacfwd(f)(row[:4]) @ row[4:].reshape(4, 4)).ravel()])
+class Ranges(dict):
+    """An operating range of case 1a with its orbits, when it is asked for; the land is touched in the second."""
+
+    rpm = {"calm": (12500.0, 18000.0), "touched": (20397.5, 20602.5)}
+
+    def __missing__(self, name):
+        now = {n: float(jc.parameters(CASE)[n]) for n in ("guidance_gap", "eccentricity")}
+        space = DesignSpace.of(CASE, {n: (0.8 * v, 1.2 * v) for n, v in now.items()})
+        self[name] = OperatingRange(space, tuple(float(jc.rpm(end)) for end in self.rpm[name]))
+        return self[name]
 
 
-@functools.partial(jax.jit, static_argnums=0)
-def _read(form, leaves, speed, tau, y):
-    """Distance from the middle, land force and power to shear the film in some states."""
-    forces = jax.vmap(jax.tree.unflatten(form, leaves).cage_at(speed).forces)(tau, *y.T)
-    return jnp.hypot(y[:, 0], y[:, 1]), jnp.hypot(*forces["contact"][:2]), -speed * forces["film"][2]
+@pytest.fixture(scope="module")
+def ranges():
+    return Ranges()
 
 
-def shot(model, speed, z, dense=False):
-    """The first revolution from the state z by DOP853, with its derivatives."""
-    leaves, form = jax.tree.flatten(model)
-    rates = lambda tau, row: np.asarray(_rates(form, leaves, speed, tau, row))
-    row = np.concatenate([z, np.eye(4).ravel()])
-    return solve_ivp(rates, (0.0, 2 * np.pi), row, "DOP853", rtol=1e-11, atol=1e-12, dense_output=dense)
+def independent(range_, quantity, value):
+    """A value of the range as a function of the design, at the speed to which it belongs."""
+    speed = float(jc.rpm(value.rpm))
+    scale = np.array([float(s) for s in CASE.scale(speed)])
+    if quantity.endswith("margin"):
+        edge = range_.edges(range_.space.place)[quantity.split()[0]]
+        end, sign = (range_.operating[0], -1) if quantity == "lower margin" else (range_.operating[1], 1)
+        return lambda m: 100 * sign * (edge_speed(m, edge.kind, speed, edge.state / scale) / end - 1)
+    through = range_.through(range_.space.place)
+    rise = np.argsort(through.value)
+    z = np.array([np.interp(speed, through.value[rise], c) for c in through.state[rise].T]) / scale
+    if quantity == "multiplier":
+        return lambda m: np.max(np.abs(np.linalg.eigvals(orbit(m, speed, z)[1])))
+    return lambda m: readings(m, speed, z)[quantity]
 
 
-def image(model, speed, z):
-    """The return map and its derivative."""
-    end = shot(model, speed, z).y[:, -1]
-    return end[:4], end[4:].reshape(4, 4)
+GRADIENTS = [
+    *(("calm", quantity, 1e-4, 1e-5) for quantity in ("lower margin", "upper margin")),
+    *(("calm", quantity, 5e-4, 1e-5) for quantity in ("multiplier", "film", "drag")),
+    *(("touched", quantity, 1e-4, 1e-3) for quantity in ("lower margin", "upper margin")),
+    *(("touched", quantity, 1e-4, 1e-3) for quantity in ("multiplier", "film", "land force", "drag")),
+]
+QUICK = [("guidance_gap", *GRADIENTS[i]) for i in (0, 2, 4)]
+ALL = [("guidance_gap", *row) for row in GRADIENTS] + [("eccentricity", *row) for row in GRADIENTS[:5]]
 
 
-def orbit(model, speed, z):
-    """The orbit near z."""
-    for _ in range(4):
-        back, monodromy = image(model, speed, z)
-        z = z - np.linalg.solve(monodromy - np.eye(4), back - z)
-    return z, monodromy
+@pytest.mark.parametrize("name, where, quantity, step, tolerance", wide_but(ALL, *QUICK))
+def test_gradients_of_requirements(name, where, quantity, step, tolerance, ranges):
+    """Against differences of fourth order, to 1e-5, and 1e-3 where the land is touched."""
+    range_ = ranges[where]
+    place = range_.space.place
+    found = range_.margins(place) | range_.worst(place, ("multiplier", "film", "land force", "drag"))
+    f, now = independent(range_, quantity, found[quantity]), float(jc.parameters(CASE)[name])
+    at = [f(jc.replace(CASE, **{name: now * (1 + i * step)})) for i in (-2, -1, 0, 1, 2)]
+    assert at[2] == pytest.approx(found[quantity].value, rel=0.02 * tolerance**0.5, abs=1e-4 * ("margin" in quantity))
+    i = range_.space.names.index(name)
+    expected = np.dot([1, -8, 0, 8, -1], at) / (12 * step * now) * range_.space.span[i]
+    assert found[quantity].slope[i] == pytest.approx(expected, rel=tolerance)
 
 
-def edge_rpm(model, kind, speed, z):
-    """The bifurcation near an orbit."""
-
-    def equations(u):
-        back, monodromy = image(model, u[4] * speed, u[:4])
-        if kind == "Neimark-Sacker":
-            test = np.max(np.abs(np.linalg.eigvals(monodromy))) - 1
-        else:
-            test = np.linalg.det(monodromy + (1 if kind == "period-doubling" else -1) * np.eye(4))
-        return np.append(back - u[:4], test)
-
-    u, _, _, _ = fsolve(equations, np.append(z, 1.0), xtol=1e-13, full_output=True)
-    assert np.max(np.abs(equations(u))) < 1e-8
-    return u[4] * speed * 30 / np.pi
+# --- designs --------------------------------------------------------------------------------------------------------
 
 
-def readings(model, speed, z):
-    """Least film [m], largest land force [N] and mean drag [W] of the orbit near z; tops by a parabola."""
-    leaves, form = jax.tree.flatten(model)
-    tau = np.arange(2**14) * 2 * np.pi / 2**14
-    path = shot(model, speed, orbit(model, speed, z)[0], dense=True).sol(tau)[:4].T
-    scale = np.array([float(s) for s in model.scale(speed)])
-    away, force, power = (np.asarray(x) for x in _read(form, leaves, speed, tau, path * scale))
-
-    def top(x):
-        k = int(np.argmax(x))
-        a, b, c = x[k - 1], x[k], x[(k + 1) % x.size]
-        return b + (c - a) ** 2 / (8 * (2 * b - a - c)) if b > 0 else 0.0
-
-    return {"film": float(model.clearance) - top(away), "land force": top(force), "drag": power.mean()}
+def test_the_worst_multiplier_of_a_planted_range():
+    """It is exp(2 pi g / w) where that is largest, at the lower end; there dg/dx = 0.55 and dg/dy = -0.1."""
+    space = DesignSpace.of(window(), {"x": (0.7, 1.3), "y": (0.9, 1.6)})
+    worst = OperatingRange(space, OPERATING).worst(space.place, ("multiplier",))["multiplier"]
+    size = lambda w: np.exp(2 * np.pi * 0.5 * (w - 1.0) * (w - 2.5) / w)
+    assert size(1.2) == max(size(np.linspace(*OPERATING, 99)))
+    assert worst.value == pytest.approx(size(1.2), rel=1e-7) and float(jc.rpm(worst.rpm)) == pytest.approx(1.2)
+    slope = worst.value * 2 * np.pi / 1.2 * np.array([0.55 * 0.6, -0.1 * 0.7])
+    np.testing.assert_allclose(worst.slope, slope, rtol=1e-5)
 
 
-def slope(f, name, step):
-    """Derivative of f(design) by a parameter, differences of fourth order."""
-    value = float(jc.parameters(CASE)[name])
-    at = [f(jc.replace(CASE, **{name: value * (1 + i * step)})) for i in (-2, -1, 1, 2)]
-    return np.dot([1, -8, 8, -1], at) / (12 * step * value)
+VARY = {"x": (0.7, 1.3), "y": (0.9, 1.6)}
+KEEP = Requirements(margin=10.0)
+LOWER, UPPER = "margin at the lower end", "margin at the upper end"
 
 
-THROUGH = ("multiplier", "film", "land force", "drag")
+def cost(system):
+    """1/x + y^2. With margins of 10 per cent from 1.2 to 2 x is at most 1.08 and x + y at least 2.2."""
+    return 1 / system.rates.x + system.rates.y**2
+
+
+def designed(**changed):
+    settings = dict(vary=VARY, keep=KEEP, cost=cost, check=0) | changed
+    return jc.design_for(window(), OPERATING, **settings)
+
+
+def test_the_optimum_and_its_prices():
+    """Both margins bind: with multipliers p, q of 1.08 - x and x + y - 2.2, q = 2 y and p = q + 1/x^2; one per cent
+    more moves the limits by 0.012 and 0.02. A check by simulations finds it calm."""
+    found = designed(check=8)
+    assert found.feasible and found.verdict == "calm" and not found.at_bound and not found.conflict
+    assert found.checked.calm and found.cost_before == pytest.approx(1 + 1.5**2)
+    assert [found.values[n] for n in ("x", "y")] == pytest.approx([1.08, 1.12], abs=1e-5)
+    assert found.cost == pytest.approx(1 / 1.08 + 1.12**2, abs=1e-5)
+    assert found.prices[LOWER] == pytest.approx(0.012 * (2.24 + 1.08**-2), rel=1e-3)
+    assert found.prices[UPPER] == pytest.approx(0.02 * 2.24, rel=1e-3) and set(found.prices) == {LOWER, UPPER}
+    assert [found.before[n].value for n in ("lower margin", "upper margin")] == pytest.approx([100 / 6, 25], abs=1e-4)
+    assert [found.after[n].value for n in ("lower margin", "upper margin")] == pytest.approx([10, 10], abs=1e-3)
+
+
+@pytest.mark.wide
+def test_the_optimum_by_an_augmented_lagrangian():
+    found = designed(search="augmented")
+    assert found.feasible and found.cost == pytest.approx(1 / 1.08 + 1.12**2, rel=0.01)
+
+
+def test_a_bound_takes_the_place_of_a_requirement():
+    """x ends at its bound, where the lower margin has no price."""
+    found = designed(vary=VARY | {"x": (0.7, 1.0)})
+    assert found.at_bound == ("x",) and [found.values[n] for n in ("x", "y")] == pytest.approx([1.0, 1.2], abs=1e-5)
+    assert found.prices == pytest.approx({UPPER: 0.02 * 2.4}, rel=1e-3)
+
+
+def test_tolerances_are_met_at_their_worst_corner():
+    """x + 0.02 is at most 1.08, and x - 0.02 + y - 0.03 at least 2.2; each tolerance uses all that it may."""
+    found = designed(tolerance={"x": Tolerance(-0.02, 0.02), "y": Tolerance(-0.03, 0.03)})
+    assert found.feasible and [found.values[n] for n in ("x", "y")] == pytest.approx([1.06, 1.19], abs=1e-5)
+    assert [found.worst[n].value for n in (LOWER, UPPER)] == pytest.approx([10, 10], abs=1e-3)
+    assert found.after["upper margin"].value == pytest.approx(12.5, abs=1e-3)
+    assert {b.name: (b.width, round(b.factor, 2)) for b in found.budget} == {"x": (0.04, 1.0), "y": (0.06, 1.0)}
+
+
+def test_requirements_that_exclude_each_other_are_named():
+    """With y at most 1 both margins are best at x = 1.125, and short by 3.75 per cent."""
+    found = designed(vary=VARY | {"y": (0.7, 1.0)})
+    assert not found.feasible and found.verdict == "not feasible"
+    assert [found.values[n] for n in ("x", "y")] == pytest.approx([1.125, 1.0], abs=1e-4)
+    assert found.short == pytest.approx({LOWER: 3.75, UPPER: 3.75}, abs=1e-2)
+    assert set(found.conflict) == {LOWER, UPPER, "the bound of y"}
+
+
+def test_the_least_width_of_an_unstable_range():
+    """It is the root of y^2 + 4 d, which y = 0 makes least."""
+    found = jc.design_for(window(y=0.8, d=0.01, k=-0.5), (0.5, 2.5), {"y": (-0.5, 1.0)}, objective="width", check=0)
+    assert found.cost_before == pytest.approx(30 / np.pi * np.sqrt(0.8**2 + 0.04), rel=1e-6)
+    assert abs(found.values["y"]) < 0.02 and found.cost == pytest.approx(30 / np.pi * 0.2, rel=5e-3)
+
+
+REFUSED = [
+    (dict(operating=(2.0, 1.2)), "`operating` must be two positive speeds, ascending, but are 2 and 1.2"),
+    (dict(vary={"z": (0.0, 1.0)}), "`z` must be a parameter of the design: x, y, d, k, s, r"),
+    (dict(vary={"x": (1.0, 1.0)}), "Bounds of `x` must ascend, but 1.0 and 1.0 were given"),
+    (dict(search="newton"), "`search` must be one of slsqp, augmented, but 'newton' was given"),
+    (dict(objective="noise"), "`objective` must be cost or width, but 'noise' was given"),
+    (dict(cost={"z": Price(1.0, 1.0)}), "`cost` must name parameters of the design, but has 'z'"),
+    (dict(tolerance={"x": Tolerance.balanced(2.5, 100.0)}), "`tolerance` gives the made range of x itself"),
+    (dict(tolerance={"x": Tolerance(0.1, -0.1)}), "`tolerance` of x must have a lower end below its upper end"),
+    (dict(operating=(2.7, 3.0)), "must have a stable orbit somewhere in its operating range, 26 to 29 rpm"),
+]
+
+
+@pytest.mark.parametrize("changed, sentence", REFUSED)
+def test_refusals(changed, sentence):
+    settings = dict(operating=OPERATING, vary=VARY, keep=KEEP, cost=cost, check=0) | changed
+    with pytest.raises(ValueError, match=sentence) as raised:
+        jc.design_for(window(), **settings)
+    assert str(raised.value).endswith(".") and ". " not in str(raised.value)
+
+
+def test_margins_that_cannot_be():
+    for margin, sentence in ((50.0, "below 50 per cent, but 50 was"), (-1.0, "at least 0 and finite, but -1 was")):
+        with pytest.raises(ValueError, match=f"`margin` must be {sentence}"):
+            Requirements(margin=margin)

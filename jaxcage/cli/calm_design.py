@@ -78,7 +78,7 @@ def _sentence(best: Any, range_: str, objective: str) -> str:
     return f"{said}, at a cost of {best.cost:.3g} (given design {best.cost_before:.3g}){coexists}."
 
 
-def read_tolerances(text: str, subject: Subject, fastest: float) -> dict[str, jc.Tolerance]:
+def read_tolerances(text: str, subject: Subject, fastest: float) -> dict[str, Any]:
     """`NAME=±X, NAME=G6.3, ...` in SI units; a grade is that at the largest cage speed [rad/s].
 
     **Raises:** `InputError`.
@@ -86,7 +86,7 @@ def read_tolerances(text: str, subject: Subject, fastest: float) -> dict[str, jc
     info = jc.parameter_info(subject.model)
     now = {name: float(value) for name, value in jc.parameters(subject.model).items()}
 
-    def read(name: str, words: str) -> jc.Tolerance:
+    def read(name: str, words: str) -> Any:
         if name not in info:
             raise InputError(f"Option --tolerance must name a parameter of the cage, but names '{name}'.")
         if (grade := GRADE.fullmatch(words)) is not None:

@@ -28,7 +28,7 @@ from .step_lengths import Points, StepControl
 SHARE = "share"
 LONGEST, SHORTEST, MOST = 1.5, 1e-6, 80
 """Longest and shortest step, in clearances and tenths of the speed and of the largest relative change; most steps."""
-SAME_DESIGN = 1e-9  # designs nearer than this have the same edge but for the last steps of Newton's method
+LEAST = 1e-10  # designs that differ by less are the same up to rounding
 SAME_EDGE = 2e-3
 """Largest relative distance of the edge by its final equations from the end of its curve."""
 
@@ -50,7 +50,8 @@ class Followed(NamedTuple):
 
     - `edge`: the edge with its derivatives, None if it was lost.
     - `ended`: empty; `turned back`, the edge met another one before the change was complete and both vanished;
-        `left the range` of speed; `lost`, continuation found no further point.
+        `left the range` of speed; `neutral saddle`, the pair of multipliers of a Neimark-Sacker bifurcation is real
+        there, so that nothing bifurcates; `lost`, continuation found no further point.
     - `share`: how far along the change the edge existed, 1 if it reached the new design.
     """
 
@@ -85,7 +86,7 @@ def follow(
     """
     require_x64()
     length = 10 * relative_change(system, other)
-    if length < SAME_DESIGN:
+    if length < LEAST:
         return _solved(other, point, name, method)
     given = Between(system, jnp.asarray(point.speed, dtype=float), other)
     units = np.array([0.1 * float(point.speed), 1 / length])
@@ -120,6 +121,8 @@ def _landed(problem: ContinuationProblem, row: Points, share: np.ndarray, point:
 def _solved(system: AbstractForcedSystem, point: Point, name: str, method: AbstractMethod | None) -> Followed:
     """Return the edge by its equations at the new design alone."""
     edge = sensitivity(system, point, name, method)
+    if edge.status == "other kind":
+        return Followed(None, "neutral saddle")
     near = abs(edge.value_rpm - float(point.speed_rpm)) < SAME_EDGE * float(point.speed_rpm)
     return Followed(edge) if np.isfinite(edge.value_rpm) and near else Followed(None, "lost")
 

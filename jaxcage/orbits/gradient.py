@@ -27,12 +27,12 @@ from .._pytrees import compiled
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import AbstractMethod
-from .bifurcation import TANGENTIAL, PointEquations, critical_rate
+from .bifurcation import ON_CIRCLE, TANGENTIAL, PointEquations, critical_rate
 from .branch import FEIGENBAUM, Cascade
 from .continuation import in_parallel
 from .newton import FieldNumbers, around_root, expansion, numbers_around, numbers_of
 from .orbit import Orbit, OrbitEquations, sorted_multipliers
-from .point import Kind, Point, eigenvalues, null_vectors, singular_matrix
+from .point import Kind, Point, eigenvalues, null_vectors, singular_matrix, to_critical
 from .problem import SPEED, Given, OrbitProblem, make_problem
 from .step_counts import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, with_fallback
 
@@ -111,6 +111,7 @@ class _Edge(NamedTuple):
     derivatives of the speed by the field's numbers (`weight`), the rate d|mu| / d speed (at a fold the drift along the
     critical direction), and the distance of the speed to that by half the steps [rad/s] (`error`)."""
 
+    kind: Kind
     problem: OrbitProblem
     u: Array
     residual: Array
@@ -125,6 +126,10 @@ class _Edge(NamedTuple):
         return float(self.problem.values(self.u)[0])
 
     @property
+    def multipliers(self) -> Complex[np.ndarray, " dim"]:
+        return eigenvalues(np.asarray(self.monodromy))
+
+    @property
     def found(self) -> bool:
         return bool(jnp.max(jnp.abs(self.residual)) < SETTLED_TO)
 
@@ -132,6 +137,8 @@ class _Edge(NamedTuple):
     def status(self) -> str:
         if not self.found:
             return "no such point"
+        if not to_critical(self.kind, jnp.asarray(self.multipliers)) < ON_CIRCLE**0.5:
+            return "other kind"  # a neutral saddle
         return "not converged" if self.error > SETTLED * self.speed else "converged"
 
 
@@ -185,7 +192,7 @@ def _polished(problem: OrbitProblem, given: Given, kind: Any, first: Array) -> _
         leads = jnp.max(jnp.abs(u - step - first))
         goes_on = (jnp.max(jnp.abs(step)) > POLISHED) & (leads < NEARBY)  # not if it is there, lost, or not a number
         if not (left and bool(goes_on)):
-            return _Edge(problem, u, step, weight, float(rate), monodromy)
+            return _Edge(kind, problem, u, step, weight, float(rate), monodromy)
         u, left = u - step, left - 1
 
 
@@ -209,8 +216,8 @@ def sensitivity(
 
     **Arguments:** a system whose parameters are declared, such as `CageModel`; a bifurcation over speed, located.
 
-    **Returns:** `Sensitivity`; it is NaN for a branch point, and if Newton's method does not find the point again, or
-    finds it elsewhere with half the steps.
+    **Returns:** `Sensitivity`; it is NaN for a branch point, and if Newton's method does not find the point again,
+    finds a neutral saddle instead of a Neimark-Sacker bifurcation, or finds it elsewhere with half the steps.
     """
     require_x64()
     if point.kind == "branch-point":  # it is there for the symmetry alone, and no function of the design
@@ -234,7 +241,7 @@ def sensitivity(
         state=np.asarray(edge.problem.state(edge.u)),
         error_rpm=edge.error / PER_RPM,
         steps=edge.steps,
-        multipliers=eigenvalues(np.asarray(edge.monodromy)),
+        multipliers=edge.multipliers,
     )
 
 
