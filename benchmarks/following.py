@@ -118,13 +118,13 @@ def main() -> None:
                 spent += time.perf_counter() - began
                 said = verdict((model, other), point, limits, fresh, found)
                 count[said] += 1
-                if said == "followed":
+                if said == "followed" and found.edge is not None:
                     edges = (sensitivity(other, p).value_rpm for p in fresh.values() if same(found.edge, p))
-                    differs = max(differs, *(abs(e / found.edge.value_rpm - 1) for e in edges))  # pyright: ignore
+                    differs = max(differs, *(abs(e / found.edge.value_rpm - 1) for e in edges))
                 elif said == "fault":
                     there = [f"{p.kind} at {float(p.speed_rpm):.3f}" for p in fresh.values()]
                     about = f"{end} {point.kind} at {float(point.speed_rpm):.3f}"
-                    print(f"  {about}: {found.ended or found.edge.value_rpm} at share {found.share:.3f}; {there}")
+                    print(f"  {about}: {found.ended or found.edge} at share {found.share:.3f}; {there}")
                     print(f"    {name}, change {done}, factors {factors.round(4).tolist()}", flush=True)
         row = "".join(f"{count[v]:13d}" for v in VERDICTS) + f"{spent / max(count.total(), 1):13.2f}"
         print(f"{name:14}{row}", flush=True)

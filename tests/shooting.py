@@ -44,6 +44,7 @@ def image(model, speed, z):
 
 def orbit(model, speed, z):
     """The orbit near z."""
+    monodromy = np.eye(4)
     for _ in range(4):
         back, monodromy = image(model, speed, z)
         z = z - np.linalg.solve(monodromy - np.eye(4), back - z)

@@ -1,6 +1,7 @@
 """A design is checked before it is believed: simulated from many initial states over its operating range."""
 
 import dataclasses
+import json
 from collections.abc import Callable
 
 import numpy as np
@@ -80,5 +81,5 @@ def check_design(
         lost,
         speeds[where] * 30 / np.pi,
         np.array([survival_at(found, int(i)).mean_life for i in where]),
-        str(found.attrs.get("method", "")),
+        json.loads(found.attrs["settings"])["method"],
     )
