@@ -11,6 +11,7 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
@@ -391,7 +392,8 @@ def _augmented(problem: _Problem, begin: np.ndarray, say: Callable[[int], None])
             trial = problem.at(place)
             broken = np.maximum(0.0, multiplier - weight * problem.at(place).slack)
             slope = (trial.cost_slope / size - broken @ trial.slack_slope)[problem.free]
-            move, state = adam.update(jnp.asarray(slope), state)
+            with jax.numpy_dtype_promotion("standard"):  # Adam's bias correction is a power of an integer
+                move, state = adam.update(jnp.asarray(slope), state)
             step, free = np.asarray(move), place[problem.free]
             for _ in range(6):  # a step that loses an edge is halved
                 there = problem.whole(np.clip(free + step, 0, 1), begin)

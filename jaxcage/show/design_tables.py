@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .._parameters import parameter_info, parameters
-from ..design import BeforeAfter, Design, Optimum, Requirement, SobolIndices, ToleranceBudget
+from ..design import BeforeAfter, Design, Optimum, Requirement, SobolIndices, ToleranceBudget, Value
 from .tables import SHOWN, Beside, Column, Table, rows_table, speed_columns
 
 
@@ -36,7 +36,7 @@ def requirement_table(title: str, found: Design, beside: Beside = None) -> Table
         row: dict[str, Any] = {"requirement": r.name, "unit": _SHOWN.get(r.of, SHOWN.get(r.unit, r.unit))}
         row["limit"] = f"{'at least' if r.sign > 0 else 'at most'} {_text(r, r.limit)}"
         values = {"before": found.before.get(r.of), "after": found.after.get(r.of), "worst": found.worst.get(r.name)}
-        row |= {name: None if each is None else _text(r, each.value) for name, each in values.items()}
+        row |= {name: None if each is None else _reached(r, each) for name, each in values.items()}
         after = found.after.get(r.of)
         rows.append(row | {"rpm": None if after is None else after.rpm})
     columns = [Column(head, ()) for head in ("requirement", "unit", "limit", "before", "after")]
@@ -52,6 +52,11 @@ def _text(r: Requirement, value: float) -> str:
     if r.of == "multiplier":
         return f"{-1 / math.log(value):.4g}" if 0 < value < 1 else "unstable"
     return Column("", [value], r.unit).cells[0]
+
+
+def _reached(r: Requirement, each: Value) -> str:
+    """The value as text; a margin without an edge is that of the limit of the search."""
+    return f"above {_text(r, each.value)}" if "margin" in r.of and not math.isfinite(each.rpm) else _text(r, each.value)
 
 
 def stricter(found: Design) -> dict[str, float]:
