@@ -168,6 +168,7 @@ QUICK = [("guidance_gap", *GRADIENTS[i]) for i in (0, 2, 4)]
 ALL = [("guidance_gap", *row) for row in GRADIENTS] + [("eccentricity", *row) for row in GRADIENTS[:5]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name, where, quantity, step, tolerance", wide_but(ALL, *QUICK))
 def test_gradients_of_requirements(name, where, quantity, step, tolerance, ranges):
     """Against differences of fourth order, to 1e-5, and 1e-3 where the land is touched."""
