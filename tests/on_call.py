@@ -17,13 +17,15 @@ import jaxtyping
 
 CHECKED = 8
 """Calls of a function in a test that are checked."""
+_NUMBERS = beartype.BeartypeConf(is_pep484_tower=True)
+"""An integer is given where `float` is asked, as Python's own type rules allow."""
 _every = jaxtyping.jaxtyped
 _calls: collections.Counter[types.CodeType] = collections.Counter()
 
 
 def checked(f: Callable[..., Any]) -> Callable[..., Any]:
     """`f`, decorated by `beartype` when it is called."""
-    made = functools.cache(lambda: beartype.beartype(f))
+    made = functools.cache(lambda: beartype.beartype(conf=_NUMBERS)(f))
 
     @functools.wraps(f)
     def run(*args: Any, **kwargs: Any) -> Any:
