@@ -47,12 +47,6 @@ class UnbalanceForce(AbstractForcing):
         return *unbalance_force(motion.phase, self.unbalance, motion.cage_speed), 0.0
 
 
-def weight(mass: Scalar, gravity: Scalar) -> tuple[Array, Array]:
-    """-M g along y [N], with mass [kg] and gravity [m/s^2]."""
-    force = jnp.asarray(mass * gravity)
-    return jnp.zeros_like(force), -force
-
-
 class WeightForce(AbstractForcing):
     """Weight of the cage."""
 

@@ -30,9 +30,7 @@ from ..forces import (
     UnbalanceReading,
     WeightForce,
     effective_eccentricity,
-    rib_force,
     smooth_norm,
-    weight,
 )
 from ..quantities import component_names
 from .field import AbstractField, SecondOrderField
@@ -146,12 +144,11 @@ class ElasticRibLaw(eqx.Module):
     def __call__(self, tau: Scalar, q: State, v: State) -> State:
         (xc, yc, xo, yo), (uc, wc, uo, wo) = q, v
         f = self.cage.forces(tau, xc - xo, yc - yo, uc - uo, wc - wo)
-        rib = self.rib
-        held = rib_force(xo, yo, uo, wo, rib.stiffness, rib.damping, rib.cubic_stiffness)
-        down = weight(rib.mass, self.gravity)
+        held_x, held_y = self.rib.holding_force(xo, yo, uo, wo)
+        mass, react = self.rib.mass, [f[name] for name in self.cage.on_land]
+        on_rib = held_x - sum(p[0] for p in react), held_y - mass * self.gravity - sum(p[1] for p in react)
         on_cage = [sum(p[i] for p in f.values()) for i in (0, 1)]
-        on_rib = [held[i] + down[i] - sum(f[name][i] for name in self.cage.on_land) for i in (0, 1)]
-        return (*(c / self.cage.mass for c in on_cage), *(c / rib.mass for c in on_rib))
+        return (*(c / self.cage.mass for c in on_cage), *(c / mass for c in on_rib))
 
 
 class CageModel(AbstractForcedSystem):
