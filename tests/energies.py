@@ -22,7 +22,7 @@ def kinetic_energy(at: BearingAtSpeed, state: BearingState) -> Array:
 def potential_energy(at: BearingAtSpeed, state: BearingState) -> Array:
     """Of weight, load and all contacts [J]."""
     rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
-    geometry = at.geometry(state)
+    geometry = at.forces(state).geometry
     weight = at.cage_mass * mass_centre(at, state)[1] + at.ring_mass * cage.ring_y
     weight = weight + at.roller_mass * jnp.sum(rollers.radius * geometry.sin)
     return weight * at.gravity + at.load * cage.ring_y + contact_energies(at, state)
@@ -31,7 +31,7 @@ def potential_energy(at: BearingAtSpeed, state: BearingState) -> Array:
 def contact_energies(at: BearingAtSpeed, state: BearingState) -> Array:
     """Elastic energy of raceways, pockets and land [J]."""
     rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
-    g, half, law = at.geometry(state), at.pocket.half, at.pocket.law
+    g, half, law = at.forces(state).geometry, at.pocket.half, at.pocket.law
     stiffness, width = at.outer_race.stiffness, at.outer_race.smoothing
     energy = jax.vmap(contact_energy, in_axes=(0, None, None))
     outer = energy(rollers.radius + half - at.outer_race.radius, width, 10 / 9)

@@ -65,8 +65,8 @@ from .contacts import (
 )
 from .field import (
     AbstractField as AbstractField,
-    AbstractLinearisation as AbstractLinearisation,
     FirstOrderField as FirstOrderField,
+    Linearisation as Linearisation,
     ScaledField as ScaledField,
     SecondOrderField as SecondOrderField,
     divide as divide,

@@ -27,14 +27,11 @@ from .contacts import (
     PocketForces,
     RacewayConstants,
     RacewayForces,
-    inner_contact,
     land_forces,
-    magnitude,
-    outer_contact,
     pocket_contact,
-    quadratic,
+    raceway_contact,
 )
-from .field import AbstractField, AbstractLinearisation
+from .field import AbstractField
 
 
 Many = Float[Array, "*rollers"] | float | int
@@ -141,9 +138,6 @@ class BearingAtSpeed(AbstractField):
         rates = self.rates(BearingState(rollers_of(row), bodies_of(row), clock)).state
         return tuple(self.pace(rates.clock[0]) * rates.row)
 
-    def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
-        raise NotImplementedError("A whole bearing has no linearisation: its methods are explicit.")
-
     def pace(self, cage_speed: Scalar) -> Scalar:
         """Factor from rates over time to rates over the cage's angle, counted in its sense."""
         return 1 / jnp.abs(cage_speed)
@@ -171,19 +165,20 @@ class BearingAtSpeed(AbstractField):
 
     def on_roller(self, rollers: Rollers, cage: Bodies, pocket_cos: Scalar, pocket_sin: Scalar) -> Forces:
         """Every contact of one roller, of whom alone `rollers` are, by elementary operations."""
-        g = self._geometry(rollers, cage, pocket_cos, pocket_sin)
+        g = self.geometry(rollers, cage, pocket_cos, pocket_sin)
         across = rollers.radius * rollers.orbit
         ring_out = cage.ring_vx * g.cos + cage.ring_vy * g.sin
         ring_across = cage.ring_vy * g.cos - cage.ring_vx * g.sin
         dv_out, dv_across = rollers.radial - ring_out, across - ring_across
-        inner = inner_contact(
+        inner = raceway_contact(
             self.inner_race,
+            False,
             g.distance,
             g.inner_out * dv_out + g.inner_across * dv_across,
             g.inner_out * dv_across - g.inner_across * dv_out,
             rollers.spin,
         )
-        outer = outer_contact(self.outer_race, rollers.radius, rollers.radial, rollers.orbit, rollers.spin)
+        outer = raceway_contact(self.outer_race, True, rollers.radius, rollers.radial, across, rollers.spin)
         pocket = pocket_contact(
             self.pocket,
             rollers.radius * g.lag_cos - (cage.x * g.pocket_cos + cage.y * g.pocket_sin),
@@ -193,9 +188,9 @@ class BearingAtSpeed(AbstractField):
             rollers.spin,
             cage.cage_speed,
         )
-        fast = magnitude(rollers.radial, across)
-        drag_out, drag_across = quadratic(rollers.radial, fast, self.drag), quadratic(across, fast, self.drag)
-        churning = quadratic(rollers.spin, jnp.abs(rollers.spin), self.churning)
+        drag = -self.drag * jnp.sqrt(rollers.radial * rollers.radial + across * across + 1e-24)  # smooth at rest
+        drag_out, drag_across = drag * rollers.radial, drag * across
+        churning = -self.churning * jnp.abs(rollers.spin) * rollers.spin
         power = -(drag_out * rollers.radial + drag_across * across + churning * rollers.spin)
         return Forces(g, outer, inner, pocket, drag_out, drag_across, churning, power)
 
@@ -206,12 +201,8 @@ class BearingAtSpeed(AbstractField):
             return land_forces(self.guide, *from_land, cage.cage_speed, self.speed)
         return land_forces(self.guide, cage.x, cage.y, cage.vx, cage.vy, cage.cage_speed, self.outer_speed)
 
-    def geometry(self, state: BearingState) -> Geometry:
-        """Places of all rollers."""
-        each = jax.vmap(self._geometry, in_axes=(0, None, 0, 0))
-        return each(Rollers(*state.rollers), Bodies(*state.bodies), *self.pockets(state.clock[0]))
-
-    def _geometry(self, rollers: Rollers, cage: Bodies, pocket_cos: Scalar, pocket_sin: Scalar) -> Geometry:
+    def geometry(self, rollers: Rollers, cage: Bodies, pocket_cos: Scalar, pocket_sin: Scalar) -> Geometry:
+        """Place of a roller."""
         lag_cos, lag_sin = cos_sin(rollers.lag)
         c, s = pocket_cos * lag_cos - pocket_sin * lag_sin, pocket_sin * lag_cos + pocket_cos * lag_sin
         out = rollers.radius - (cage.ring_x * c + cage.ring_y * s)

@@ -26,7 +26,7 @@ from ..bearing import (
 )
 from ..forces import Land, LandContact, RibFilm
 from .bearing_field import BearingAtSpeed
-from .bearing_history import RollerHistory, bearing_orders, roller_history
+from .bearing_history import bearing_orders, roller_history
 from .bearing_quantities import QUANTITIES
 from .bearing_states import BESIDE, OF_BODIES, OF_ROLLER, WATCHED, BearingState, Bodies, Rollers
 from .cage import FASTEST
@@ -39,7 +39,6 @@ from .contacts import (
     RollerDrag,
     Traction,
     bar_stiffness,
-    hunt_crossley,
 )
 from .protocol import AbstractForcedSystem, StepLimits
 
@@ -51,8 +50,6 @@ FIRST_ANGLE = -math.pi / 2
 SLOWEST_CAGE = 0.01
 """Smallest speed of the cage in pure rolling over that of the faster ring: a revolution of a cage that hardly turns
 takes for ever."""
-SAMPLES = 16
-"""Strobe states of a revolution that a sweep records."""
 SPACING = TURN / 16
 PERIODS, COMPARED, SLOWEST = 50, 10, 1000.0
 """Constants of `BearingModel.comparable` and `BearingModel.slowness`."""
@@ -169,27 +166,15 @@ class BearingModel(AbstractForcedSystem):
     }
     speed_text = "shaft speed"
     quantities = QUANTITIES
+    beside = BESIDE
+    beside_start = (FIRST_ANGLE, *(0.0,) * (len(BESIDE) - 1))
+    watched = WATCHED
+    samples = 16
     steps = StepLimits(TURN / 20_000, TURN / 200, TURN / 4e9, 5_000.0)
 
     @property
     def dimension(self) -> int:
         return OF_ROLLER * self.bearing.n_rollers + OF_BODIES
-
-    @property
-    def beside(self) -> tuple[str, ...]:
-        return BESIDE
-
-    @property
-    def beside_start(self) -> tuple[float, ...]:
-        return (FIRST_ANGLE, *(0.0,) * (len(BESIDE) - 1))
-
-    @property
-    def watched(self) -> tuple[str, ...]:
-        return WATCHED
-
-    @property
-    def samples(self) -> int:
-        return SAMPLES
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -251,11 +236,8 @@ class BearingModel(AbstractForcedSystem):
         turned = PERIODS * TURN * scale.rollers[2, 0] / scale.rollers[3, 0] * jnp.abs(self.rolling_cage_speed(speed))
         return jnp.clip(SPACING / turned, 1.0, SLOWEST)
 
-    def roller_history(self, run: Any) -> RollerHistory:
-        return roller_history(self, run)
-
-    def known_orders(self, run: Any) -> dict[str, float]:
-        return bearing_orders(self, run)
+    roller_history = roller_history
+    known_orders = bearing_orders
 
     def comparable(self, speed: float) -> float:
         """Angle of the cage [rad] over which two runs can be compared.
@@ -279,7 +261,7 @@ class BearingModel(AbstractForcedSystem):
         half = bearing.roller_diameter / 2
         shared = (
             bearing.raceway_stiffness,
-            hunt_crossley(races.raceway_damping),
+            1.5 * races.raceway_damping,
             races.raceway_smoothing,
             self.traction.curve,
         )

@@ -76,25 +76,14 @@ class AbstractForcedSystem(eqx.Module):
     quantities: ClassVar[tuple[Quantity, ...]] = ()
     """Quantities that the model reports of a run, which follow from `beside` and `watched`."""
 
-    @property
-    def beside(self) -> tuple[str, ...]:
-        """Names of the quantities that are integrated beside the state; the state does not follow from them."""
-        return ()
-
-    @property
-    def beside_start(self) -> tuple[float, ...]:
-        """Values of the quantities beside the state at the beginning of a run."""
-        return (0.0,) * len(self.beside)
-
-    @property
-    def watched(self) -> tuple[str, ...]:
-        """Names of the quantities whose largest values are recorded."""
-        return ("excursion",)
-
-    @property
-    def samples(self) -> int:
-        """Number of strobe states of a revolution that a sweep records."""
-        return 1
+    beside: ClassVar[tuple[str, ...]] = ()
+    """Names of the quantities that are integrated beside the state; the state does not follow from them."""
+    beside_start: ClassVar[tuple[float, ...]] = ()
+    """Values of the quantities beside the state at the beginning of a run."""
+    watched: ClassVar[tuple[str, ...]] = ("excursion",)
+    """Names of the quantities whose largest values are recorded."""
+    samples: ClassVar[int] = 1
+    """Number of strobe states of a revolution that a sweep records."""
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -153,13 +142,13 @@ class AbstractForcedSystem(eqx.Module):
     def starts(self, speed: Scalar) -> tuple[Any, ...]:
         """Initial states a sweep runs from unless told otherwise, the conventional one first."""
 
-    @abc.abstractmethod
     def excursion(self, y: Any) -> Scalar:
         """Distance from the centre of the states for which the model is valid, 1 at their edge; for a cage, eps.
 
         A trajectory must start at 1 or less, is flagged beyond 1, and fails beyond `ESCAPE`. A system without such an
-        edge returns 0.
+        edge returns 0, as by default.
         """
+        return 0.0
 
 
 def require_speeds(model: AbstractForcedSystem, speeds: Any, name: str = "speed") -> None:
