@@ -12,7 +12,7 @@ from .._arguments import is_concrete, require_above_zero
 from .._errors import ArgumentError
 from .._parameters import count, parameter
 from .._pytrees import Scalar
-from .line_contact import PALMGREN_CONSTANT, line_contact_stiffness, series_stiffness
+from .line_contact import PALMGREN_CONSTANT, line_contact_stiffness
 
 
 class Material(eqx.Module):
@@ -37,29 +37,6 @@ def bearing_steel() -> Material:
     EN ISO 683-17 data sheets give 210 GPa and 0.30. With 7800 kg/m^3 a roller of 16 mm x 27 mm weighs 42.3 g.
     """
     return Material(density=7800.0, youngs_modulus=210e9, poisson_ratio=0.30)
-
-
-def raceway_surface_speed(angular_speed: Scalar, raceway_diameter: Scalar) -> Array:
-    """Surface speed of a raceway, v = omega d/2, (7).
-
-    **Arguments:** speed of the ring [rad/s], diameter of its raceway [m].
-
-    **Returns:** surface speed [m/s].
-    """
-    require_above_zero(raceway_diameter=raceway_diameter)
-    return jnp.asarray(angular_speed * raceway_diameter / 2)
-
-
-def cage_speed(inner_speed: Scalar, outer_speed: Scalar, roller_diameter: Scalar, pitch_diameter: Scalar) -> Array:
-    """Speed of the set of rollers, and so of the cage, in pure rolling, (8).
-
-    **Arguments:** speeds of inner and outer ring [rad/s], roller and pitch diameter [m].
-
-    **Returns:** w_c = [w_i (1 - d_w/d_m) + w_o (1 + d_w/d_m)]/2 [rad/s].
-    """
-    require_above_zero(roller_diameter=roller_diameter, pitch_diameter=pitch_diameter)
-    ratio = roller_diameter / pitch_diameter
-    return jnp.asarray((inner_speed * (1 - ratio) + outer_speed * (1 + ratio)) / 2)
 
 
 class Bearing(eqx.Module):
@@ -121,18 +98,16 @@ class Bearing(eqx.Module):
         return line_contact_stiffness(self.palmgren_constant, self.roller_length)
 
     @property
-    def contact_stiffness(self) -> Array:
-        """Stiffness of one roller between both raceways, (3) and (4) [N/m^(10/9)]."""
-        return series_stiffness(self.raceway_stiffness, self.raceway_stiffness)
-
-    @property
     def cage_speed_ratio(self) -> Array:
         """Cage speed over shaft speed, from (8): (1 - d_w/d_m)/2 [1]."""
         return jnp.asarray((1 - self.roller_diameter / self.pitch_diameter) / 2)
 
-    def cage_speed(self, shaft_speed: Scalar) -> Array:
-        """Cage speed at a shaft speed, both in rad/s, (8). It is also w_co of (11), since the rib rests."""
-        return cage_speed(shaft_speed, 0.0, self.roller_diameter, self.pitch_diameter)
+    def cage_speed(self, shaft_speed: Scalar, outer_speed: Scalar = 0.0) -> Array:
+        """Speed of rollers and cage in pure rolling, w_c = [w_i (1 - d_w/d_m) + w_o (1 + d_w/d_m)]/2 [rad/s], (8).
+
+        **Arguments:** speeds of inner and outer ring [rad/s]. With the outer ring at rest it is also w_co of (11).
+        """
+        return jnp.asarray(shaft_speed * self.cage_speed_ratio + outer_speed * (1 - self.cage_speed_ratio))
 
     def shaft_speed(self, cage_speed: Scalar) -> Array:
         """Shaft speed at a cage speed, both in rad/s: the inverse of (8)."""

@@ -358,7 +358,7 @@ def rolling_start(
     pitch = model.outer_radius - bearing.roller_diameter / 2
     centrifugal = bearing.roller_mass * pitch * omega**2
     approach = down * jnp.sin(angles) - bearing.radial_clearance / 2
-    _, outer = raceway_loads_of_all(approach, stiff, stiff, centrifugal)
+    _, outer = raceway_loads_of_all(approach, stiff, centrifugal)
     radius = pitch + jax.vmap(line_contact_approach, in_axes=(None, 0))(stiff, outer)
     x, y, vx, vy = CAGE_STARTS[cage] if place is None else place
     lag = jnp.arcsin(c * (y * jnp.cos(angles) - x * jnp.sin(angles)) / radius)

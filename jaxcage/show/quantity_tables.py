@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from .._parameters import walk
 from ..analysis import Measures, failed, named_lines, scatter
-from ..bearing import Guidance, LoadDistribution, raceway_surface_speed, static_cage_displacement
+from ..bearing import Guidance, LoadDistribution, static_cage_displacement
 from ..files import configuration
 from .run_figures import Rollers
 from .tables import SHOWN, Column, Table, rows_table, value_table
@@ -105,10 +105,9 @@ def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed:
         ("cage speed over shaft speed", float(bearing.cage_speed_ratio), "1"),
     ]
     if shaft_speed is not None:
-        surface = raceway_surface_speed(shaft_speed, bearing.inner_raceway_diameter)
         rows += [
             ("cage speed", float(bearing.cage_speed(shaft_speed)), "rad/s"),
-            ("surface speed of the inner raceway", float(surface), "m/s"),
+            ("surface speed of the inner raceway", float(shaft_speed * bearing.inner_raceway_diameter / 2), "m/s"),
             ("centrifugal force of a roller", float(bearing.roller_centrifugal_force(shaft_speed)), "N"),
         ]
     return value_table(title, rows)
