@@ -404,31 +404,3 @@ def _by_field_name(model: Any) -> dict[str, tuple[str, ...]]:
             paths.append(names)
     last = [path[-1] for path in paths]
     return {(path[-1] if last.count(path[-1]) == 1 else ".".join(path)): path for path in paths}
-
-
-def printed(model: eqx.Module) -> str:
-    """One line for every parameter, choice and count of `model`: name, value, unit, where it comes from."""
-    rows = []
-    for path, field in walk(model):
-        name, value, info = ".".join(path), get(model, path), field.metadata.get("parameter")
-        if info is None:
-            words = field.metadata.get("readings", {}).get(value, field.metadata.get("text", ""))
-            rows.append((name, str(value), "", words))
-        else:
-            between = "" if info.within is None else ", {:g} to {:g} if not measured".format(*info.within)
-            unit = "" if info.unit in ("1", UNKNOWN) else info.unit
-            rows.append((name, _number(value), unit, f"{info.kind}{between}: {info.source}"))
-    widths = [max(len(row[i]) for row in rows) for i in range(3)]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row[:3], widths, strict=True)) for row in rows]
-    said = [f"  {line}  {row[3]}".rstrip() for line, row in zip(lines, rows, strict=True)]
-    return "\n".join([f"{type(model).__name__}, values in SI units", *said])
-
-
-def _number(value: Any) -> str:
-    try:
-        known = np.asarray(value, dtype=float)
-    except Exception:  # traced, or a placeholder of tree surgery
-        return "traced"
-    if known.ndim == 0:
-        return f"{float(known):.6g}"
-    return f"{np.min(known):.6g} to {np.max(known):.6g} ({known.size} values)"

@@ -25,7 +25,6 @@ from .elementary import (
     cos_sin as cos_sin,
     inverse_root as inverse_root,
     power_10_9 as power_10_9,
-    root_9 as root_9,
     smooth_norm as smooth_norm,
     smooth_plus as smooth_plus,
 )

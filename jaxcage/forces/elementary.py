@@ -82,21 +82,15 @@ def _inverse_ninth_root_jvp(primals: tuple[Array], tangents: tuple[Array]) -> tu
     return root, root * _ninth_power(root) * (-1 / 9) * p_dot
 
 
-def root_9(p: Scalar) -> Array:
-    """p^(1/9) for p >= 0, with finite derivatives of every order at p = 0 (where they are taken as zero)."""
+def power_10_9(p: Scalar) -> Array:
+    """p^(10/9) for p >= 0, with finite derivatives of every order at p = 0: those of p^(1/9) are taken as zero there."""
     p = jnp.asarray(p, dtype=float)
     touching = p > 0
     safe = jnp.where(touching, p, 1.0)
     root = _inverse_ninth_root(safe)
     root2 = root * root
     root4 = root2 * root2
-    return jnp.where(touching, safe * (root4 * root4), 0.0)
-
-
-def power_10_9(p: Scalar) -> Array:
-    """p^(10/9) for p >= 0, with finite derivatives as those of `root_9`."""
-    p = jnp.asarray(p, dtype=float)
-    return p * root_9(p)
+    return p * jnp.where(touching, safe * (root4 * root4), 0.0)
 
 
 def _polynomial(coefficients: tuple[float, ...], z: Scalar) -> Scalar:

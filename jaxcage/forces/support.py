@@ -2,6 +2,7 @@
 the rib that guides the cage, rigid or a mass on its own elastic support.
 """
 
+from functools import partial
 from typing import ClassVar, Literal
 
 import equinox as eqx
@@ -15,27 +16,18 @@ Cross = Literal["circulatory", "as_printed"]
 Cubic = Literal["absolute", "dimensionless"]
 
 
+_spring = partial(
+    parameter, "N/m", 0.0, 1e9, within=(1e4, 1e6), source="tap the cage on its rib: the frequency it answers with"
+)
+
+
 class Support(AbstractLaw):
     """Stiffness and damping between cage and rib; none of the values is printed in the paper."""
 
     law_name = "support"
 
-    stiffness_x: Scalar = parameter(
-        "N/m",
-        0.0,
-        1e9,
-        "support stiffness K_x",
-        within=(1e4, 1e6),
-        source="tap the cage on its rib: the frequency it answers with",
-    )
-    stiffness_y: Scalar = parameter(
-        "N/m",
-        0.0,
-        1e9,
-        "support stiffness K_y",
-        within=(1e4, 1e6),
-        source="tap the cage on its rib: the frequency it answers with",
-    )
+    stiffness_x: Scalar = _spring("support stiffness K_x")
+    stiffness_y: Scalar = _spring("support stiffness K_y")
     damping: Scalar = parameter(
         "N s/m",
         0.0,

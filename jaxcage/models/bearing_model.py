@@ -32,7 +32,6 @@ from .bearing_states import BESIDE, OF_BODIES, OF_ROLLER, WATCHED, BearingState,
 from .cage import FASTEST
 from .contacts import (
     Guide,
-    PocketConstants,
     Pockets,
     RacewayConstants,
     Raceways,
@@ -269,14 +268,10 @@ class BearingModel(AbstractForcedSystem):
         density = drag.oil_share * self.lubricant.density
         length = bearing.roller_length
         return BearingAtSpeed(
-            n_rollers=bearing.n_rollers,
-            held=self.cage_rotation == "held",
-            inner_guided=self.guidance == "inner",
+            model=self,
             speed=speed,
-            outer_speed=self.outer_speed,
             outer_race=RacewayConstants(half, self.outer_radius, self.outer_speed, *shared),
             inner_race=RacewayConstants(half, self.inner_radius, speed, *shared),
-            pocket=PocketConstants(half, bearing.pocket_clearance, self.pockets),
             guide=Guide(
                 film=film.at(self, speed),
                 contact=contact.at(self, speed),
@@ -289,13 +284,6 @@ class BearingModel(AbstractForcedSystem):
             roller_inertia=bearing.roller_mass * half**2 / 2,
             drag=drag.drag_coefficient * density * half * length,
             churning=drag.churning_coefficient * density * half**4 * length / 2,
-            cage_mass=self.cage_mass,
-            cage_inertia=self.cage_inertia,
-            eccentricity=self.eccentricity,
-            ring_mass=self.ring.ring_mass,
-            mounting_damping=self.ring.mounting_damping,
-            gravity=self.gravity,
-            load=self.load,
             rolling_cage_speed=self.rolling_cage_speed(speed),
             rolling_spin=self.rolling_spin(speed),
         )

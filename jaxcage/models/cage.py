@@ -13,7 +13,7 @@ from jaxtyping import Array
 
 from .._arguments import is_concrete
 from .._errors import ArgumentError
-from .._parameters import parameter, printed, reading, require_readings, with_numbers
+from .._parameters import parameter, reading, require_readings, with_numbers
 from .._pytrees import Scalar, State
 from ..bearing import Bearing, Lubricant
 from ..forces import (
@@ -98,20 +98,13 @@ class CageAtSpeed(eqx.Module):
         """The law of a force, with its constants."""
         return self.laws[self.names.index(name)]
 
-    def motion(self, tau: Scalar, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> Motion:
-        """Motion of a cage with its centre at (x, y) [m] from the rib centre, moving at (vx, vy) [m/s]."""
-        return Motion(tau, x, y, vx, vy, self.speed, 0.0, self.shaft_speed, self.land)
-
     def forces(self, tau: Scalar, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> dict[str, Force]:
-        """Every force on the cage by name, as (F_x, F_y, moment) [N, N, N m]."""
-        motion = self.motion(tau, x, y, vx, vy)
-        return {name: _force(name, law, motion) for name, law in zip(self.names, self.laws, strict=True)}
+        """Every force on a cage by name, as (F_x, F_y, moment) [N, N, N m].
 
-    @property
-    def on_land(self) -> tuple[str, ...]:
-        """Names of the forces between land and cage, which react on an elastic rib."""
-        pairs = zip(self.names, self.laws, strict=True)
-        return tuple(name for name, law in pairs if not isinstance(law, AbstractForcing))
+        **Arguments:** phase; place of the cage's centre from the rib's [m] and its velocity [m/s].
+        """
+        motion = Motion(tau, x, y, vx, vy, self.speed, 0.0, self.shaft_speed, self.land)
+        return {name: _force(name, law, motion) for name, law in zip(self.names, self.laws, strict=True)}
 
 
 def _force(name: str, law: AbstractForce, motion: Motion) -> Force:
@@ -145,7 +138,8 @@ class ElasticRibLaw(eqx.Module):
         (xc, yc, xo, yo), (uc, wc, uo, wo) = q, v
         f = self.cage.forces(tau, xc - xo, yc - yo, uc - uo, wc - wo)
         held_x, held_y = self.rib.holding_force(xo, yo, uo, wo)
-        mass, react = self.rib.mass, [f[name] for name in self.cage.on_land]
+        laws = zip(f.values(), self.cage.laws, strict=True)
+        mass, react = self.rib.mass, [force for force, law in laws if not isinstance(law, AbstractForcing)]
         on_rib = held_x - sum(p[0] for p in react), held_y - mass * self.gravity - sum(p[1] for p in react)
         on_cage = [sum(p[i] for p in f.values()) for i in (0, 1)]
         return (*(c / self.cage.mass for c in on_cage), *(c / mass for c in on_rib))
@@ -219,9 +213,6 @@ class CageModel(AbstractForcedSystem):
         named = [law.law_name for law in self.forces if law.law_name]
         return (*named, "unbalance", "weight", *(type(law).__name__ for law in self.extra))
 
-    def __str__(self) -> str:
-        return printed(self)
-
     @property
     def dimension(self) -> int:
         return 4 if isinstance(self.rib, RigidRib) else 8
@@ -236,8 +227,12 @@ class CageModel(AbstractForcedSystem):
         return "shaft speed", self.bearing.shaft_speed(speed)
 
     def centre(self, y: State) -> tuple[Scalar, Scalar]:
-        x, dy = (y[0], y[1]) if isinstance(self.rib, RigidRib) else (y[0] - y[2], y[1] - y[3])
+        x, dy = self._offset(y)
         return x / self.clearance, dy / self.clearance
+
+    def _offset(self, y: State) -> tuple[Scalar, Scalar]:
+        """Cage centre from that of the rib [m]."""
+        return (y[0], y[1]) if isinstance(self.rib, RigidRib) else (y[0] - y[2], y[1] - y[3])
 
     def check_speeds(self, speeds: np.ndarray, name: str) -> None:
         if not is_concrete(self.land_radius):
@@ -299,8 +294,7 @@ class CageModel(AbstractForcedSystem):
 
     def excursion(self, y: State) -> Scalar:
         """Eccentricity ratio eps of the cage centre in its clearance circle; 1 where the surfaces would overlap."""
-        x, dy = (y[0], y[1]) if isinstance(self.rib, RigidRib) else (y[0] - y[2], y[1] - y[3])
-        return smooth_norm(x, dy, self.film.smoothing) / self.clearance
+        return smooth_norm(*self._offset(y), self.film.smoothing) / self.clearance
 
     def abrupt(self, y: State, rate: State) -> tuple[Scalar, Scalar]:
         """The onset of land contact, whose force sets in within a smoothing length.

@@ -30,20 +30,12 @@ class Constants:
     impact_amplitude: float
     """Amplitude at a cage speed of 1000 rad/s."""
     impact_exponent: float
-    contact_stiffness: float | None
-    """[N/m^(10/9)]; None if it is given by a force at a penetration of one clearance."""
-    contact_force: float | None = None
-    contact_onset: float = 0.97
+    contact_stiffness: float | None = None
+    """[N/m^(10/9)]; where it is not given it follows from the force."""
+    contact_force: float = 0.0
+    """Force at a penetration of one clearance [N]."""
     restitution: float = 1.0
-    gravity: float = 9.81
     unbalance: UnbalanceReading = "physical"
-
-    def contact_stiffness_in(self, clearance: float) -> float:
-        """Contact stiffness of a case with this clearance [m]."""
-        if self.contact_stiffness is not None:
-            return self.contact_stiffness
-        assert self.contact_force is not None
-        return self.contact_force / clearance ** (10 / 9)
 
 
 CONSTANTS: dict[str, Constants] = {
@@ -56,7 +48,6 @@ CONSTANTS: dict[str, Constants] = {
         land_width=4.2679e-3,
         impact_amplitude=109.9051,
         impact_exponent=1.5091,
-        contact_stiffness=None,
         contact_force=68992.2,
     ),
     "identified": Constants(
@@ -94,7 +85,9 @@ def case(name: str, constants: str = "identified") -> CageModel:
         forces=(
             RibFilm(land_width=found.land_width),
             LandContact(
-                stiffness=found.contact_stiffness_in(gap), onset=found.contact_onset, restitution=found.restitution
+                stiffness=found.contact_stiffness or found.contact_force / gap ** (10 / 9),
+                onset=0.97,
+                restitution=found.restitution,
             ),
             Support(
                 stiffness_x=found.support_stiffness,
@@ -108,7 +101,6 @@ def case(name: str, constants: str = "identified") -> CageModel:
         cage_mass=found.cage_mass,
         guidance_gap=gap,
         eccentricity=published.eccentricity_um * 1e-6,
-        gravity=found.gravity,
         clearance_reading="as_printed",
         unbalance=found.unbalance,
     )

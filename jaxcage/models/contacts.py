@@ -11,7 +11,7 @@ quadratic: F = -(1/2) C_d rho D l |v| v and M = -(1/2) C_n rho (D/2)^4 l |s| s w
 (J. H. Rumbarger, E. G. Filetti and D. Gubernick, J. Lubr. Technol. 95 (1973) 401).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -257,18 +257,8 @@ class PocketForces(NamedTuple):
     """N times the sliding speed [W]."""
 
 
-class PocketConstants(NamedTuple):
-    """Constants of a pocket contact."""
-
-    half: Scalar
-    """D/2 [m]."""
-    clearance: Scalar
-    """T, of both sides together [m]."""
-    law: Pockets
-
-
 def pocket_contact(
-    at: PocketConstants,
+    model: Any,
     out: Scalar,
     along: Scalar,
     v_out: Scalar,
@@ -278,22 +268,23 @@ def pocket_contact(
 ) -> PocketForces:
     """The bars on a roller.
 
-    **Arguments:** place of the roller's centre from the cage's, along n_j and t_j of its pocket [m]; velocity of the
-    roller's centre relative to the cage's, not to the turning pocket [m/s]; spin and cage speed [rad/s].
+    **Arguments:** the `BearingModel`; place of the roller's centre from the cage's, along n_j and t_j of its pocket
+    [m]; velocity of the roller's centre relative to the cage's, not to the turning pocket [m/s]; spin and cage speed
+    [rad/s].
     """
-    law = at.law
+    law, half = model.pockets, model.bearing.roller_diameter / 2
     side = jnp.where(along >= 0, 1.0, -1.0)
     rate = side * (v_along - cage_speed * out)
-    overlap = side * along - at.clearance / 2
+    overlap = side * along - model.bearing.pocket_clearance / 2
     elastic = law.elastic(overlap)
     normal = elastic * smooth_plus(1 + 1.5 * law.pocket_damping * rate, 1e-4)
-    sliding = v_out + cage_speed * along - side * at.half * (spin - cage_speed)
+    sliding = v_out + cage_speed * along - side * half * (spin - cage_speed)
     friction = -law.pocket_friction * normal * saturated(sliding, law.saturation_speed)
     return PocketForces(
         along=-side * normal,
         out=friction,
-        roller_moment=-side * at.half * friction,
-        cage_moment=out * side * normal + (along + side * at.half) * friction,
+        roller_moment=-side * half * friction,
+        cage_moment=out * side * normal + (along + side * half) * friction,
         normal=normal,
         lost_in_sliding=-friction * sliding,
         lost_in_damping=(normal - elastic) * rate,
