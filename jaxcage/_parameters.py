@@ -39,18 +39,14 @@ SOURCES: dict[Kind, str] = {
 
 @dataclasses.dataclass(frozen=True)
 class ParameterInfo:
-    """What is known of a parameter beside its value: SI unit, closed range of sensible values, description, kind."""
+    """What is known of a parameter beside its value: SI unit, closed range of sensible values, description, source."""
 
     unit: str
     lower: float
     upper: float
     text: str
-    kind: Kind = "fixed"
-    """Who knows it."""
-    within: tuple[float, float] | None = None
-    """Range that an `unknown` one lies in, if nothing has been measured."""
     source: str = ""
-    """Where its value comes from; of an `unknown` one, what to measure."""
+    """Where its value comes from, or what to measure."""
 
 
 UNKNOWN = "?"
@@ -82,20 +78,18 @@ def parameter(
     text: str,
     *,
     kind: Kind = "fixed",
-    within: tuple[float, float] | None = None,
     source: str = "",
     **kwargs: Any,
 ) -> Any:
     """A differentiable leaf of a module, with `unit` (SI) and the closed range `[lower, upper]` users may give.
 
-    `kind` says who knows it, `within` in which range one lies that is unknown, `source` what to measure.
+    `kind` says who knows it, or `source` what to measure.
 
     **Raises:** `ValueError` for a unit that is not made of 1, rad, K, kg, m, s, N, Pa.
     """
     if unit != UNKNOWN:
         unit_dimensions(unit)
-    who: Kind = "unknown" if within else kind
-    info = ParameterInfo(unit, lower, upper, text, who, within, source or SOURCES[who])
+    info = ParameterInfo(unit, lower, upper, text, source or SOURCES[kind])
     return eqx.field(converter=functools.partial(_leaf_of, info), metadata={"parameter": info}, **kwargs)
 
 

@@ -30,7 +30,7 @@ from .line_contact import (
     line_contact_stiffness as line_contact_stiffness,
     raceway_loads_of_all as raceway_loads_of_all,
 )
-from .oil import Lubricant as Lubricant, vg as vg, walther_viscosity as walther_viscosity
+from .oil import Lubricant as Lubricant, vg as vg
 from .statics import (
     Guidance as Guidance,
     LoadDistribution as LoadDistribution,

@@ -83,7 +83,7 @@ def _inverse_ninth_root_jvp(primals: tuple[Array], tangents: tuple[Array]) -> tu
 
 
 def power_10_9(p: Scalar) -> Array:
-    """p^(10/9) for p >= 0, with finite derivatives of every order at p = 0: those of p^(1/9) are taken as zero there."""
+    """p^(10/9) for p >= 0, with finite derivatives of every order at p = 0; those of p^(1/9) are zero there."""
     p = jnp.asarray(p, dtype=float)
     touching = p > 0
     safe = jnp.where(touching, p, 1.0)

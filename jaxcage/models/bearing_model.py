@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._arguments import is_concrete, require_x64
+from .._arguments import is_concrete, require_at_least, require_x64
 from .._errors import ArgumentError
 from .._parameters import choice, parameter
 from .._pytrees import Scalar, compiled
@@ -313,14 +313,8 @@ LEAST_LOAD = 1e-3
 
 
 def drawn_places(count: int, seed: int = 0) -> tuple[CagePlace, ...]:
-    """Places of the cage drawn evenly from most of its clearance, at the speed of rolling.
-
-    **Arguments:** how many; seed.
-
-    **Raises:** `ValueError` for none.
-    """
-    if count < 1:
-        raise ArgumentError("count", said=f"must be at least 1, but {count} was given.")
+    """Places of the cage drawn evenly from most of its clearance, at the speed of rolling: how many, and the seed."""
+    require_at_least(1, count=count)
     rng = np.random.default_rng(seed)
     place = WITHIN * np.sqrt(rng.uniform(size=count)) * np.exp(2j * np.pi * rng.uniform(size=count))
     return tuple((float(z.real), float(z.imag), 0.0, 0.0) for z in place)
