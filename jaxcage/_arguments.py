@@ -73,13 +73,6 @@ def require_at_least(least: int, **numbers: Any) -> None:
             raise ArgumentError(name, said=f"must be at least {least}, but {shown(value)} was given.")
 
 
-def require_above_zero(**numbers: Any) -> None:
-    """**Raises:** `ArgumentError` for numbers that are not positive and finite, by name; what is traced passes."""
-    for name, value in numbers.items():
-        if not isinstance(value, Tracer) and not np.all((np.asarray(value) > 0) & np.isfinite(value)):
-            raise ArgumentError(name, said=f"must be positive and finite, but {shown(value)} was given.")
-
-
 def options(annotation: Any) -> tuple[Any, ...]:
     """The members of a union, or the annotation alone; of a type variable those of its bound."""
     if isinstance(annotation, typing.TypeVar) and annotation.__bound__ is not None:

@@ -54,7 +54,6 @@ unwrap = inspect.unwrap
         (lambda: jc.bearing.Material("brass", 1e11, 0.3), "must be a number from .* but 'brass' was given"),
         (lambda: jc.ForcedOscillator(3, coordinates=1), "`acceleration` must be something that can be called, but 3"),
         (lambda: jc.ForcedSystem(DUFFING.acceleration, 2.5), "`dimension` must be a whole number"),
-        (lambda: jc.forces.film_scale(0.1, 1.0, 0.0, 1.0), "`width` must be positive and finite, but 0.0"),
     ],
 )
 def test_wrong_arguments_get_a_sentence(call: Callable[[], Any], said: str):

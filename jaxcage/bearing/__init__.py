@@ -32,8 +32,7 @@ from .line_contact import (
 )
 from .oil import Lubricant as Lubricant, vg as vg
 from .statics import (
-    Guidance as Guidance,
     LoadDistribution as LoadDistribution,
     load_distribution as load_distribution,
-    static_cage_displacement as static_cage_displacement,
+    static_cage_displacements as static_cage_displacements,
 )

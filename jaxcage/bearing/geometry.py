@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from .._arguments import is_concrete, require_above_zero
+from .._arguments import is_concrete
 from .._errors import ArgumentError
 from .._parameters import count, parameter
 from .._pytrees import Scalar
@@ -127,7 +127,6 @@ def design_rule_violations(bearing: Bearing, guidance_gap: Scalar) -> list[str]:
 
     **Returns:** a list of sentences, empty when the rule holds.
     """
-    require_above_zero(guidance_gap=guidance_gap)
     t, c_r, g_r = (1e3 * float(x) for x in (bearing.pocket_clearance, guidance_gap, bearing.radial_clearance))
     sentences = []
     if not t > c_r:

@@ -5,7 +5,6 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array
 
-from .._arguments import require_above_zero
 from .._pytrees import Scalar
 
 
@@ -27,7 +26,6 @@ def line_contact_stiffness(palmgren_constant: Scalar, length: Scalar) -> Array:
 
     **Returns:** K [N/m^(10/9)].
     """
-    require_above_zero(palmgren_constant=palmgren_constant)
     return jnp.asarray(palmgren_constant * _power(length, 8 / 9))
 
 

@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from .._arguments import is_concrete, require_above_zero
-from .._errors import ArgumentError
+from .._arguments import is_concrete
+from .._errors import ArgumentError, shown
 from .._parameters import ROUNDING, parameter
 from .._pytrees import Scalar
 
@@ -94,7 +94,8 @@ def vg(grade: Scalar, temperature: Scalar = CELSIUS_40) -> Lubricant:
 
     **Arguments:** grade [mm^2/s at 40 C], operating temperature [K].
     """
-    require_above_zero(grade=grade, temperature=temperature)
+    if is_concrete(grade) and not np.all((np.asarray(grade) > 0) & np.isfinite(grade)):
+        raise ArgumentError("grade", said=f"must be positive and finite, but {shown(grade)} was given.")
     given: Any = np.asarray(grade, dtype=float) if is_concrete(grade) else grade  # NumPy compiles no program
     return Lubricant(
         density=870.0,

@@ -1,7 +1,6 @@
 """Distribution of the load over the rollers, and where the cage rests: paper eqs. (1), (2), (5), (6), (10)."""
 
 from functools import partial
-from typing import Literal, get_args
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -9,14 +8,12 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
-from .._arguments import is_concrete, require_above_zero, require_x64
+from .._arguments import is_concrete, require_x64
 from .._errors import ArgumentError
 from .._pytrees import Scalar
 from .geometry import Bearing
 from .line_contact import line_contact_approach, raceway_loads_of_all
 
-
-Guidance = Literal["outer_rib", "inner_rib", "roller"]
 
 LARGEST = 1e12
 """Largest load that is accepted [N]."""
@@ -51,33 +48,17 @@ class LoadDistribution(eqx.Module):
     """
 
 
-def static_cage_displacement(
-    guidance: str,
-    *,
-    guidance_gap: Scalar,
-    pocket_clearance: Scalar,
-    radial_clearance: Scalar,
-    elastic_approach: Scalar,
-) -> Array:
-    """Distance of the resting cage below the bearing centre: (1) outer rib, (5) inner rib, (6) roller.
+def static_cage_displacements(bearing: Bearing, guidance_gap: Scalar, elastic_approach: Scalar) -> dict[str, Scalar]:
+    """Distance of the resting cage below the bearing centre, by the ring that guides it [m].
 
-    **Arguments:** `Guidance`, then C_r, T, G_r and delta_r [m]. delta_r is the elastic approach at the most loaded
-    roller, delta_r + G_r/2 the shift of the shaft. An outer rib needs C_r alone.
+    (1) outer rib C_r/2, (5) inner rib delta_r + G_r/2 + C_r/2, (6) roller delta_r + G_r/2 + T.
 
-    **Returns:** C_r/2, delta_r + G_r/2 + C_r/2 or delta_r + G_r/2 + T [m].
-
-    **Raises:** `ValueError` for another kind of guidance.
+    **Arguments:** the bearing, the gap C_r, and delta_r [m], the elastic approach at the most loaded roller: delta_r +
+    G_r/2 is the shift of the shaft.
     """
-    require_x64()
-    require_above_zero(guidance_gap=guidance_gap)
-    shift = elastic_approach + radial_clearance / 2
-    if guidance == "outer_rib":
-        return jnp.asarray(guidance_gap / 2)
-    if guidance == "inner_rib":
-        return jnp.asarray(shift + guidance_gap / 2)
-    if guidance == "roller":
-        return jnp.asarray(shift + pocket_clearance)
-    raise ArgumentError("guidance", said=f"must be one of {', '.join(get_args(Guidance))}, but {guidance!r} was given.")
+    shift = elastic_approach + bearing.radial_clearance / 2
+    at_rest = guidance_gap / 2
+    return {"outer_rib": at_rest, "inner_rib": shift + at_rest, "roller": shift + bearing.pocket_clearance}
 
 
 @eqx.filter_jit

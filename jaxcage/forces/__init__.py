@@ -53,7 +53,6 @@ from .inertia import (
     UnbalanceReading as UnbalanceReading,
     WeightForce as WeightForce,
     effective_eccentricity as effective_eccentricity,
-    unbalance_force as unbalance_force,
 )
 from .law import (
     AbstractForce as AbstractForce,

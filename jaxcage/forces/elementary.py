@@ -8,7 +8,6 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from .._arguments import require_above_zero
 from .._pytrees import Scalar
 
 
@@ -42,7 +41,6 @@ def smooth_plus(u: Scalar, width: Scalar) -> Array:
 
     **Returns:** a value >= 0 in that unit; it exceeds max(u, 0) by at most 0.16 `width`, at u = 0.
     """
-    require_above_zero(width=width)
     t = jnp.clip((u + width) * (0.5 / width), 0.0, 1.0)
     return jnp.where(u >= width, u, 2 * width * t**4 * (t * (t - 3) + 2.5))
 

@@ -21,7 +21,6 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from .._arguments import require_above_zero, require_at_least
 from .._parameters import choice, count, parameter
 from .._pytrees import Scalar
 from .elementary import inverse_root
@@ -47,36 +46,7 @@ def film_scale(viscosity: Scalar, radius: Scalar, width: Scalar, clearance: Scal
 
     **Arguments:** dynamic viscosity [Pa s], land radius [m], width of one land [m], radial clearance [m].
     """
-    require_at_least(0, viscosity=viscosity)
-    require_above_zero(radius=radius, width=width)
     return jnp.asarray(viscosity * radius * width * (width / clearance) ** 2)
-
-
-def fixed_half_resistance(x: Scalar, y: Scalar, direction: Vector) -> Resistance:
-    """M over the half circle that trails the line of centres (alpha from 0 to pi), as in (27).
-
-    With r' = (-y, x) it is isotropic I + radial r r^T - skew (n r'^T + r' n^T).
-
-    **Arguments:** position over clearance, and its direction as a unit vector, regularised where the arc loses it (at
-    the centre).
-    """
-    nx, ny = direction
-    inverse = 1 / (1 - (x * x + y * y))
-    isotropic = jnp.pi / 2 * inverse * jnp.sqrt(inverse)
-    radial, skew = 3 * isotropic * inverse, 2 * inverse * inverse
-    return Resistance(
-        isotropic + radial * x * x + 2 * skew * nx * y,
-        radial * x * y - skew * (nx * x - ny * y),
-        isotropic + radial * y * y - 2 * skew * nx * y,
-    )
-
-
-def full_resistance(x: Scalar, y: Scalar) -> Resistance:
-    """M over the whole circle: pressure of both signs (full Sommerfeld condition)."""
-    inverse = 1 / (1 - (x * x + y * y))
-    isotropic = jnp.pi * inverse * jnp.sqrt(inverse)
-    radial = 3 * isotropic * inverse
-    return Resistance(isotropic + radial * x * x, radial * x * y, isotropic + radial * y * y)
 
 
 def half_circle_resistance(x: Scalar, y: Scalar, ux: Scalar, uy: Scalar) -> Resistance:
@@ -124,13 +94,24 @@ def arc_centre(model: FilmModel, direction: Vector, drive: Vector, least: Scalar
 
 
 def film_resistance(model: FilmModel, x: Scalar, y: Scalar, direction: Vector, arc: Vector) -> Resistance:
-    """M of one of the three film models at position (x, y) over clearance, whose unit vector is `direction`; `arc` as
-    from `arc_centre`."""
-    if model == "fixed_half":
-        return fixed_half_resistance(x, y, direction)
+    """M of one of the three film models.
+
+    Over the whole circle it is isotropic I + radial r r^T. Over the half circle that trails the line of centres (alpha
+    from 0 to pi), as in (27), it is half of that and - skew (n r'^T + r' n^T) with r' = (-y, x).
+
+    **Arguments:** film model; position (x, y) over clearance, and its direction n as a unit vector, regularised at the
+    centre, where the fixed arc loses it; the arc as from `arc_centre`.
+    """
+    if model == "positive_pressure":
+        return half_circle_resistance(x, y, *arc)
+    inverse = 1 / (1 - (x * x + y * y))
+    isotropic = (jnp.pi if model == "full" else jnp.pi / 2) * inverse * jnp.sqrt(inverse)
+    radial = 3 * isotropic * inverse
+    xx, xy, yy = isotropic + radial * x * x, radial * x * y, isotropic + radial * y * y
     if model == "full":
-        return full_resistance(x, y)
-    return half_circle_resistance(x, y, *arc)
+        return Resistance(xx, xy, yy)
+    (nx, ny), skew = direction, 2 * inverse * inverse
+    return Resistance(xx + 2 * skew * nx * y, xy - skew * (nx * x - ny * y), yy - 2 * skew * nx * y)
 
 
 class RibFilm(AbstractLaw):

@@ -14,7 +14,6 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._arguments import require_at_least
 from .._parameters import count, parameter
 from .._pytrees import Scalar
 from ..bearing import load_distribution
@@ -87,7 +86,6 @@ def impact_history(
 
     **Returns:** `ImpactHistory`.
     """
-    require_at_least(1, samples=samples, substeps=substeps)
 
     def contact(d_w: Array, d_c: Array) -> Array:
         return impact.contact_stiffness * power_10_9(jnp.maximum(d_w - d_c, 0.0))
@@ -186,7 +184,6 @@ def pulse_spectrum(
     pulse. Coefficients are good to 1e-10 of the largest (1e-9 where it bounces ten times). They are NaN where 20 000
     steps do not resolve a pulse: a bar that swings tens of thousands of radians, or waves as many, during one impact.
     """
-    require_at_least(1, n_rollers=n_rollers)
     law = impact.oscillator
     v0 = approach_speed(law.approach_ratio, omega, pocket_clearance)
     moves = v0 > 0
@@ -214,7 +211,6 @@ def pulse_train(
     The zone is centred on -y with half angle theta; rollers turn counter-clockwise, enter at -pi/2 - theta, where the
     direction of motion is (cos theta, -sin theta), and leave at -pi/2 + theta, where it is (cos theta, sin theta).
     """
-    require_at_least(1, n_rollers=n_rollers)
     cosine, sine = pulse_spectrum(impact, omega, n_rollers, roller_mass, pocket_clearance)
     k = jnp.arange(impact.harmonics + 1, dtype=float) * n_rollers
 
