@@ -72,7 +72,7 @@ def test_wrong_arguments_get_a_sentence(call: Callable[[], Any], said: str):
     ids=["sweep", "simulate", "ramp", "periodic_orbit"],
 )
 def test_revolutions_per_minute_for_radians_are_refused(run):
-    with pytest.raises(ValueError, match=r"must be in rad/s, .* but 9000 was given, .* `jaxcage.rpm\(9000\)`"):
+    with pytest.raises(ValueError, match=r"must be in rad/s .* but 9000 was given, .* `jaxcage.rpm\(9000\)`"):
         run()
 
 

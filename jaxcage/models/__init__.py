@@ -44,7 +44,6 @@ from .bearing_states import (
     rollers_of as rollers_of,
 )
 from .cage import (
-    FASTEST as FASTEST,
     FORCES as FORCES,
     NEEDED as NEEDED,
     CageModel as CageModel,
@@ -69,6 +68,7 @@ from .field import (
 from .oscillator import ForcedOscillator as ForcedOscillator, ForcedSystem as ForcedSystem
 from .protocol import (
     ESCAPE as ESCAPE,
+    FASTEST as FASTEST,
     INSTEAD as INSTEAD,
     AbstractForcedSystem as AbstractForcedSystem,
     require_known as require_known,

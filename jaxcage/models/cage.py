@@ -2,7 +2,6 @@
 M r_C'' = F_film + F_contact + F_support + F_impact + M e omega^2 (cos tau, sin tau) - M g y.
 """
 
-import math
 from typing import Any, Literal
 
 import equinox as eqx
@@ -34,7 +33,7 @@ from ..forces import (
 )
 from ..quantities import component_names
 from .field import AbstractField, SecondOrderField
-from .protocol import AbstractForcedSystem, told
+from .protocol import FASTEST, AbstractForcedSystem, told
 
 
 ClearanceReading = Literal["as_printed", "radial"]
@@ -49,9 +48,6 @@ ONSET_WIDTH = 4.0
 """Distance from the onset of land contact, in smoothing lengths, within which steps are not shortened any more."""
 SMOOTHEST = 0.1
 """Largest smoothing length over clearance: a larger one is no detail of the contact or of the film's centre."""
-FASTEST = 300.0
-"""Surface speed of the cage at its land [m/s] beyond which no cage runs: rho v^2 alone is 765 MPa of hoop stress in
-brass, twice what it bears, and what is given in rpm for rad/s is 9.5 times as fast as meant."""
 
 
 def _in_order(laws: Any) -> Any:
@@ -234,19 +230,8 @@ class CageModel(AbstractForcedSystem):
         """Cage centre from that of the rib [m]."""
         return (y[0], y[1]) if isinstance(self.rib, RigidRib) else (y[0] - y[2], y[1] - y[3])
 
-    def check_speeds(self, speeds: np.ndarray, name: str) -> None:
-        if not is_concrete(self.land_radius):
-            return
-        highest, limit = float(np.max(speeds, initial=0.0)), fastest_speed(self)
-        if highest > limit:
-            raise ArgumentError(
-                name,
-                said=(
-                    f"must be in rad/s, at most {limit:.0f} ({FASTEST:g} m/s at the land of this cage), but "
-                    f"{highest:g} was given, which is {highest * 30 / math.pi:.0f} rpm: `jaxcage.rpm({highest:g})` "
-                    "makes rad/s of rpm."
-                ),
-            )
+    def land_speed(self, speed: Scalar) -> Scalar:
+        return speed * self.land_radius
 
     @property
     def clearance(self) -> Array:
