@@ -110,7 +110,9 @@ def _wrong_one(kind: Any, value: Any, may_miss: bool) -> str:
     if is_plain_class(kind):
         return "" if isinstance(value, kind) else f"of kind {kind.__name__}"
     if origin is typing.Literal:
-        return "" if isinstance(value, str) and value in inside else f"one of {', '.join(map(str, inside))}"
+        return (
+            "" if isinstance(value, str | int | None) and value in inside else f"one of {', '.join(map(str, inside))}"
+        )
     if origin is Callable:
         return "" if callable(value) else "something that can be called"
     if not inspect.isclass(origin) or not issubclass(origin, Mapping | Sequence):

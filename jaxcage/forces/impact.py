@@ -221,7 +221,8 @@ def pulse_train(
     (a_in, b_in), (a_out, b_out) = shifted(-jnp.pi / 2 - half_angle), shifted(-jnp.pi / 2 + half_angle)
     across, down = jnp.cos(half_angle), -jnp.sin(half_angle)
     rows = across * (a_in - a_out), across * (b_in - b_out), down * (a_in + a_out), down * (b_in + b_out)
-    return RollerPassForce(*(tuple(jnp.unstack(row)) for row in rows), n_rollers)
+    a_x, b_x, a_y, b_y = (tuple(jnp.unstack(row)) for row in rows)
+    return RollerPassForce(a_x, b_x, a_y, b_y, n_rollers)
 
 
 class RollerPassForce(AbstractForcing):

@@ -26,7 +26,7 @@ from ..bearing import (
 )
 from ..forces import Land, LandContact, RibFilm
 from .bearing_field import BearingAtSpeed
-from .bearing_history import bearing_orders, roller_history
+from .bearing_history import RollerHistory, bearing_orders, roller_history
 from .bearing_quantities import QUANTITIES
 from .bearing_states import BESIDE, OF_BODIES, OF_ROLLER, WATCHED, BearingState, Bodies, Rollers
 from .contacts import (
@@ -230,8 +230,11 @@ class BearingModel(AbstractForcedSystem):
         turned = PERIODS * TURN * scale.rollers[2, 0] / scale.rollers[3, 0] * jnp.abs(self.rolling_cage_speed(speed))
         return jnp.clip(SPACING / turned, 1.0, SLOWEST)
 
-    roller_history = roller_history
-    known_orders = bearing_orders
+    def roller_history(self, run: Any) -> RollerHistory:
+        return roller_history(self, run)
+
+    def known_orders(self, run: Any) -> dict[str, float]:
+        return bearing_orders(self, run)
 
     def comparable(self, speed: float) -> float:
         """Angle of the cage [rad] over which two runs can be compared.

@@ -108,21 +108,18 @@ class Traction(eqx.Module):
 
 
 def lambert_w(x: Scalar) -> Array:
-    """The upper branch of w exp(w) = x for x > -1/e, by Halley's method. Differentiable."""
+    """The upper branch of w exp(w) = x for x > -1/e. Differentiable.
+
+    Newton's method descends to the root from log(1 + x), which is at or above it, and from 0 if x is negative.
+    """
     x = jnp.asarray(x, dtype=float)
-    # Near the branch point w = -1 + p, elsewhere log(1 + x): both within a third of the root.
-    p = jnp.sqrt(jnp.maximum(2 * (jnp.exp(1.0) * x + 1), 1e-30))
-    start = jnp.where(x < 0, -1 + p - p * p / 3, jnp.log1p(jnp.maximum(x, 0.0)))
 
-    def better(_: Array, w: Array) -> Array:
+    def better(_: Any, w: Array) -> Array:
         e = jnp.exp(w)
-        defect = w * e - x
-        return w - defect / (e * (w + 1) - (w + 2) * defect / (2 * w + 2))
+        return w - (w * e - x) / (e * (w + 1))
 
-    root = jax.lax.fori_loop(0, 12, better, jax.lax.stop_gradient(start))
-    e = jnp.exp(jax.lax.stop_gradient(root))
-    w = jax.lax.stop_gradient(root)
-    return w - (w * e - x) / (e * (w + 1))  # one of Newton's steps, which carries the derivative
+    root = jax.lax.fori_loop(0, 64, better, jnp.log1p(jnp.maximum(x, 0.0)))
+    return better(None, jax.lax.stop_gradient(root))  # the last step carries the derivative
 
 
 class Pockets(eqx.Module):

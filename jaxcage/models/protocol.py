@@ -169,7 +169,7 @@ def require_speeds(model: AbstractForcedSystem, speeds: Any, name: str = "speed"
     if np.any(bad := ~((given > 0) & (given <= HIGHEST))):
         said = f"must be positive and finite, at most {HIGHEST:g} rad/s, but {given[bad].flat[0]:g} was given."
         raise ArgumentError(name, said=said)
-    for speed in (given.min(), given.max()) if given.size else ():
+    for speed in (given.max(), given.min()) if given.size else ():
         land = model.land_speed(speed)
         if is_concrete(land) and (fastest := float(np.max(np.asarray(land)))) > FASTEST:
             raise ArgumentError(
