@@ -53,7 +53,7 @@ class Bearing(eqx.Module):
     radial_clearance: Scalar = parameter("m", 0.0, 1e-3, "radial clearance G_r, on the diameter", kind="catalogue")
     pocket_clearance: Scalar = parameter("m", 0.0, 1e-2, "pocket clearance T, on the diameter", kind="drawing")
     palmgren_constant: Scalar = parameter(
-        "Pa", 1e8, 1e13, "Palmgren's line-contact constant C_P", kind="fixed", default=PALMGREN_CONSTANT
+        "Pa", 1e8, 1e13, "Palmgren's line-contact constant C_P", default=PALMGREN_CONSTANT
     )
     roller_material: Material = eqx.field(default_factory=bearing_steel)
 

@@ -35,7 +35,7 @@ class Lubricant(eqx.Module):
     temperature_2: Scalar = parameter("K", 200.0, 600.0, "temperature of the second point", kind="oil")
     temperature: Scalar = parameter("K", 200.0, 600.0, "operating temperature", kind="operating", default=CELSIUS_40)
     reference_viscosity: Scalar = parameter(
-        "m^2/s", 1e-7, 1e-5, "1 mm^2/s, the unit in the double logarithm of ASTM D341", kind="fixed", default=1e-6
+        "m^2/s", 1e-7, 1e-5, "1 mm^2/s, the unit in the double logarithm of ASTM D341", default=1e-6
     )
 
     def __check_init__(self) -> None:

@@ -79,7 +79,7 @@ class LandContact(AbstractLaw):
         default=1.0,
     )
     approach_speed: Scalar = parameter(
-        "m/s", 1e-4, 10.0, "approach speed to which the restitution belongs", kind="fixed", default=0.1
+        "m/s", 1e-4, 10.0, "approach speed to which the restitution belongs", default=0.1
     )
     smoothing: Scalar = parameter(
         "m", 1e-12, 1e-5, "half width over which contact sets in and film coefficients saturate", default=2e-7

@@ -121,7 +121,7 @@ class RibFilm(AbstractLaw):
 
     land_width: Scalar = parameter("m", 1e-4, 0.05, "width of one guiding land", kind="drawing")
     smoothing: Scalar = parameter(
-        "m", 1e-12, 1e-5, "length that keeps the film differentiable at the centre", kind="fixed", default=1e-9
+        "m", 1e-12, 1e-5, "length that keeps the film differentiable at the centre", default=1e-9
     )
     supply_pressure: Scalar = parameter(
         "Pa", 0.0, 1e6, "gauge supply pressure p_0 of (27)", kind="operating", default=0.0

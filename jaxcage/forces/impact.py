@@ -138,9 +138,7 @@ class SynchronousImpact(AbstractLaw):
         "power n of speed; 20/19 for a Hertz impact on a stiff bar",
         source="once-a-revolution part of the acceleration of the cage, at two speeds",
     )
-    reference_speed: Scalar = parameter(
-        "rad/s", 1.0, 1e5, "speed to which the amplitude belongs", kind="fixed", default=1000.0
-    )
+    reference_speed: Scalar = parameter("rad/s", 1.0, 1e5, "speed to which the amplitude belongs", default=1000.0)
 
     def at(self, cage: GuidedCage, speed: Scalar) -> "SynchronousForce":
         """The force at cage speed `speed` [rad/s]."""

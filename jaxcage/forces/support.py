@@ -2,7 +2,6 @@
 the rib that guides the cage, rigid or a mass on its own elastic support.
 """
 
-from functools import partial
 from typing import ClassVar, Literal
 
 import equinox as eqx
@@ -14,9 +13,9 @@ from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion
 
 Cross = Literal["circulatory", "as_printed"]
 Cubic = Literal["absolute", "dimensionless"]
-
-
-_spring = partial(parameter, "N/m", 0.0, 1e9, source="tap the cage on its rib: the frequency it answers with")
+_SPRING = "tap the cage on its rib: the frequency it answers with"
+_CUBIC = "push the cage on its rib: force over way, far out"
+_WHIRL = "whirl frequency and its growth, from two probes at the cage"
 
 
 class Support(AbstractLaw):
@@ -24,42 +23,20 @@ class Support(AbstractLaw):
 
     law_name = "support"
 
-    stiffness_x: Scalar = _spring("support stiffness K_x")
-    stiffness_y: Scalar = _spring("support stiffness K_y")
+    stiffness_x: Scalar = parameter("N/m", 0.0, 1e9, "support stiffness K_x", source=_SPRING)
+    stiffness_y: Scalar = parameter("N/m", 0.0, 1e9, "support stiffness K_y", source=_SPRING)
     damping: Scalar = parameter(
         "N s/m", 0.0, 1e5, "support damping B_s", source="tap the cage on its rib: how fast the answer decays"
     )
     cubic_stiffness: Scalar = parameter(
-        "N/m^3",
-        0.0,
-        1e18,
-        "cubic stiffness K_3, for cubic = absolute",
-        source="push the cage on its rib: force over way, far out",
-        default=0.0,
+        "N/m^3", 0.0, 1e18, "cubic stiffness K_3, for cubic = absolute", source=_CUBIC, default=0.0
     )
     cubic_ratio: Scalar = parameter(
-        "1",
-        0.0,
-        1e4,
-        "alpha in K_3 = alpha K_s / c^2, for cubic = dimensionless",
-        source="push the cage on its rib: force over way, far out",
-        default=0.0,
+        "1", 0.0, 1e4, "alpha in K_3 = alpha K_s / c^2, for cubic = dimensionless", source=_CUBIC, default=0.0
     )
-    cross_stiffness: Scalar = parameter(
-        "N/m",
-        -1e8,
-        1e8,
-        "cross-coupling stiffness K_xy",
-        source="whirl frequency and its growth, from two probes at the cage",
-        default=0.0,
-    )
+    cross_stiffness: Scalar = parameter("N/m", -1e8, 1e8, "cross-coupling stiffness K_xy", source=_WHIRL, default=0.0)
     cross_cubic: Scalar = parameter(
-        "N/m^3",
-        -1e18,
-        1e18,
-        "cubic cross-coupling K'_xy, for cross = as_printed",
-        source="whirl frequency and its growth, from two probes at the cage",
-        default=0.0,
+        "N/m^3", -1e18, 1e18, "cubic cross-coupling K'_xy, for cross = as_printed", source=_WHIRL, default=0.0
     )
     cross: Cross = choice("circulatory", "as_printed", text="form of the cross-coupling", default="circulatory")
     cubic: Cubic = choice("absolute", "dimensionless", text="how the cubic stiffness is given", default="absolute")

@@ -159,11 +159,9 @@ class CageModel(AbstractForcedSystem):
         "m", 0.0, 1e-3, "distance e of the cage's mass centre from its centre", kind="drawing"
     )
     rib: RigidRib | ElasticRib = eqx.field(default_factory=RigidRib)
-    gravity: Scalar = parameter("m/s^2", 0.0, 100.0, "acceleration of gravity", kind="fixed", default=9.81)
+    gravity: Scalar = parameter("m/s^2", 0.0, 100.0, "acceleration of gravity", default=9.81)
     load: Scalar = parameter("N", 0.0, 1e7, "shaft load F", kind="operating", default=4450.0)
-    printed_unit: Scalar = parameter(
-        "m", 1e-6, 1.0, "unit in which unbalance = as_printed reads rho", kind="fixed", default=1e-3
-    )
+    printed_unit: Scalar = parameter("m", 1e-6, 1.0, "unit in which unbalance = as_printed reads rho", default=1e-3)
     clearance_reading: ClearanceReading = reading(
         "radial clearance c of film, contact and land",
         radial="c = C_r/2, as C_r is defined",
