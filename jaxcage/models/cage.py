@@ -102,6 +102,11 @@ class CageAtSpeed(eqx.Module):
         motion = Motion(tau, x, y, vx, vy, self.speed, 0.0, self.shaft_speed, self.land)
         return {name: _force(name, law, motion) for name, law in zip(self.names, self.laws, strict=True)}
 
+    def __call__(self, tau: Scalar, q: State, v: State) -> State:
+        """Acceleration of a cage in a rib that does not move."""
+        f, per_mass = self.forces(tau, *q, *v).values(), 1 / self.mass
+        return per_mass * sum(p[0] for p in f), per_mass * sum(p[1] for p in f)
+
 
 def _force(name: str, law: AbstractForce, motion: Motion) -> Force:
     """**Raises:** `ValueError` for a user's law that returns anything but three numbers."""
@@ -110,17 +115,6 @@ def _force(name: str, law: AbstractForce, motion: Motion) -> Force:
     if not isinstance(force, tuple) or [jnp.shape(part) for part in force] != [(), (), ()]:
         raise ValueError(f"Force `{name}` must return (F_x, F_y, moment), three numbers, but returned {force}.")
     return force
-
-
-class RigidRibLaw(eqx.Module):
-    """Acceleration of a cage in a rib that does not move."""
-
-    cage: CageAtSpeed
-
-    def __call__(self, tau: Scalar, q: State, v: State) -> State:
-        f = self.cage.forces(tau, *q, *v).values()
-        per_mass = 1 / self.cage.mass
-        return per_mass * sum(p[0] for p in f), per_mass * sum(p[1] for p in f)
 
 
 class ElasticRibLaw(eqx.Module):
@@ -202,12 +196,6 @@ class CageModel(AbstractForcedSystem):
         return tuple(law for law in self.forces if not law.law_name)
 
     @property
-    def force_names(self) -> tuple[str, ...]:
-        """Names of all forces on the cage, in the order in which they are added."""
-        named = [law.law_name for law in self.forces if law.law_name]
-        return (*named, "unbalance", "weight", *(type(law).__name__ for law in self.extra))
-
-    @property
     def dimension(self) -> int:
         return 4 if isinstance(self.rib, RigidRib) else 8
 
@@ -247,18 +235,20 @@ class CageModel(AbstractForcedSystem):
 
     def cage_at(self, speed: Scalar) -> CageAtSpeed:
         """The cage's force laws at `speed` [rad/s]."""
-        mass = self.cage_mass
+        named, extra, c = [law for law in self.forces if law.law_name], self.extra, self.clearance
         arm = effective_eccentricity(self.unbalance, self.eccentricity, self.guidance_gap, self.printed_unit)
-        own = (UnbalanceForce(mass * arm), WeightForce(mass * self.gravity))
-        known = [law.at(self, speed) for law in self.forces if law.law_name]
-        laws = (*known, *own, *(law.at(self, speed) for law in self.extra))
-        c, contact = self.clearance, self.contact
-        land = Land(c, 1 / c, contact.onset, contact.smoothing / c, self.film.smoothing / c)
-        return CageAtSpeed(laws, self.force_names, land, mass, speed, self.bearing.shaft_speed(speed))
+        own = {
+            "unbalance": UnbalanceForce(self.cage_mass * arm),
+            "weight": WeightForce(self.cage_mass * self.gravity),
+        }
+        laws = (*(law.at(self, speed) for law in named), *own.values(), *(law.at(self, speed) for law in extra))
+        names = (*(law.law_name for law in named), *own, *(type(law).__name__ for law in extra))
+        land = Land(c, 1 / c, self.contact.onset, self.contact.smoothing / c, self.film.smoothing / c)
+        return CageAtSpeed(laws, names, land, self.cage_mass, speed, self.bearing.shaft_speed(speed))
 
     def at_speed(self, speed: Scalar) -> AbstractField:
         cage = self.cage_at(speed)
-        law = RigidRibLaw(cage) if isinstance(self.rib, RigidRib) else ElasticRibLaw(cage, self.rib, self.gravity)
+        law = cage if isinstance(self.rib, RigidRib) else ElasticRibLaw(cage, self.rib, self.gravity)
         return SecondOrderField(law, speed)
 
     def scale(self, speed: Scalar) -> State:
