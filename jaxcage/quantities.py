@@ -128,7 +128,6 @@ _QUANTITIES = (
 )
 
 GLOSSARY: dict[str, Quantity] = {quantity.name: quantity for quantity in _QUANTITIES}
-"""Quantities by name."""
 
 
 def quantity(name: str) -> Quantity:
