@@ -4,6 +4,7 @@ import jax
 import numpy as np
 import pytest
 
+import jaxcage
 import jaxcage.bearing as jb
 
 
@@ -102,6 +103,11 @@ def test_an_oil_thinner_than_its_law_allows_is_doubted():
 def test_impossible_oils(oil, said):
     with pytest.raises(ValueError, match=said):
         oil()
+
+
+def test_a_part_of_a_model_is_compared_when_its_numbers_are_replaced():
+    with pytest.raises(ValueError, match="must not rise with the temperature"):
+        jaxcage.replace(jaxcage.case("1a"), viscosity_2=1e-4)
 
 
 def test_an_oil_of_constant_viscosity():
