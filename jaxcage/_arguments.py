@@ -23,6 +23,7 @@ from ._errors import ArgumentError, shown as shown
 
 MOST = 10_000_000
 """Of anything that is counted: more ends in no memory, or in no lifetime."""
+WHOLE = "a whole number"
 _REAL = "biuf"
 _ARRAYS = (jax.Array, np.ndarray, np.generic)
 
@@ -36,37 +37,28 @@ def check_layer(layer: dict[str, Any], names: str) -> None:
 
 
 def checked(f: Callable[..., Any]) -> Callable[..., Any]:
-    """`f`, which compares its arguments with their annotations first."""
-
-    @functools.wraps(f)
-    def run(*args: Any, **kwargs: Any) -> Any:
-        check_call(f, *args, **kwargs)
-        return f(*args, **kwargs)
-
-    return run
-
-
-def check_call(f: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
-    """Compare arguments with the annotations of `f`; some of them may be missing.
+    """`f`, which compares its arguments with their annotations first; some of them may be missing.
 
     **Raises:** `ArgumentError` for the first that is not what its annotation says.
     """
-    signature = _signature(f)
-    try:
-        given = signature.bind_partial(*args, **kwargs).arguments
-    except TypeError:
-        return  # Python says it as it always does, where `f` is called
-    for name, value in given.items():
-        parameter = signature.parameters[name]
-        if parameter.kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD):
-            continue
-        if parameter.annotation is inspect.Parameter.empty:  # `self`
-            continue
-        if said := wrong(parameter.annotation, value):
-            raise ArgumentError(name, said=f"must be {said}, but {shown(value)} was given.")
+    signature = inspect.signature(f)
 
+    @functools.wraps(f)
+    def run(*args: Any, **kwargs: Any) -> Any:
+        try:
+            given = signature.bind_partial(*args, **kwargs).arguments
+        except TypeError:
+            given = {}  # Python says it as it always does, where `f` is called
+        for name, value in given.items():
+            parameter = signature.parameters[name]
+            several = parameter.kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+            if several or parameter.annotation is inspect.Parameter.empty:  # the latter is `self`
+                continue
+            if said := wrong(parameter.annotation, value):
+                raise ArgumentError(name, said=f"must be {said}, but {shown(value)} was given.")
+        return f(*args, **kwargs)
 
-_signature = functools.lru_cache(maxsize=1024)(inspect.signature)
+    return run
 
 
 def is_concrete(*values: object) -> bool:
@@ -81,13 +73,6 @@ def require_at_least(least: int, **numbers: Any) -> None:
             raise ArgumentError(name, said=f"must be at least {least}, but {shown(value)} was given.")
 
 
-def require_above_zero(**numbers: Any) -> None:
-    """**Raises:** `ArgumentError` for numbers that are not positive and finite, by name; what is traced passes."""
-    for name, value in numbers.items():
-        if not isinstance(value, Tracer) and not np.all((np.asarray(value) > 0) & np.isfinite(value)):
-            raise ArgumentError(name, said=f"must be positive and finite, but {shown(value)} was given.")
-
-
 def options(annotation: Any) -> tuple[Any, ...]:
     """The members of a union, or the annotation alone; of a type variable those of its bound."""
     if isinstance(annotation, typing.TypeVar) and annotation.__bound__ is not None:
@@ -98,43 +83,36 @@ def options(annotation: Any) -> tuple[Any, ...]:
 
 
 def wrong(annotation: Any, value: Any, in_row: bool = False) -> str:
-    """What an argument must be, or a thing of a row, empty if it is that or if its annotation does not say."""
+    """Words for what an argument must be; empty if it is that, or if its annotation does not say."""
     members = options(annotation)
     if _is_traced(value) or (value is None and types.NoneType in members):
         return ""
-    members = tuple(m for m in members if m is not types.NoneType)
-    arrays = [m for m in members if is_array_type(m)]
     if isinstance(value, _ARRAYS) and not _is_real(value, any("Complex" in str(m) for m in members)):
         return "of real numbers, without a mask"
-    if bool in members:
-        return "" if isinstance(value, bool | np.bool_) or len(members) > 1 else "True or False"
-    if int in members and float not in members:
-        if isinstance(value, _ARRAYS) and any(np.ndim(value) for _ in arrays):
-            return ""
-        others = [m for m in members if m is not int and not is_array_type(m)]
-        rows = others if not isinstance(value, _ARRAYS) else []  # an array is no row of things
-        fits = _is_count(value) or any(not _wrong_one(m, value) for m in rows)
-        return "" if fits else f"a whole number of at most {MOST}" if type(value) is int else "a whole number"
-    if float in members:
-        missing = isinstance(value, float) and math.isnan(value)  # as a quantity or a part of a state may be
-        return "a number" if missing and not arrays and not in_row else _wrong_number(members, arrays, value)
-    if all(typing.get_origin(m) is typing.Literal for m in members):
-        known = [option for m in members for option in typing.get_args(m)]
-        return "" if isinstance(value, str) and value in known else f"one of {', '.join(map(str, known))}"
-    if arrays and len(arrays) == len(members):
-        return "" if _is_real(value, any("Complex" in str(m) for m in members)) else "an array of numbers"
-    if all(is_plain_class(m) for m in members):
-        names = " or ".join(m.__name__ for m in members)
-        return "" if isinstance(value, members) else f"of kind {names}"
-    said = [_wrong_one(member, value) for member in members]
-    return " or ".join(said) if all(said) else ""
+    may_miss = in_row or any(map(is_array_type, members))  # NaN, as a quantity or a part of a state may be
+    said = [_wrong_one(member, value, may_miss) for member in members if member is not types.NoneType]
+    if not all(said):
+        return ""
+    return " or ".join(words for words in dict.fromkeys(said) if float not in members or words != WHOLE)
 
 
-def _wrong_one(kind: Any, value: Any) -> str:
-    """The same for a member of a union: a class, a function, a mapping or a row of something."""
+def _wrong_one(kind: Any, value: Any, may_miss: bool) -> str:
+    """The same for a member of a union."""
     origin, inside = typing.get_origin(kind), typing.get_args(kind)
-    if origin is None:
-        return wrong(kind, value) if is_plain_class(kind) or is_array_type(kind) else ""
+    if kind is float or (is_array_type(kind) and kind.dim_str == ""):
+        return _wrong_number(value, may_miss)
+    if kind is int:
+        return "" if _is_count(value) else f"{WHOLE} of at most {MOST}" if type(value) is int else WHOLE
+    if kind is bool:
+        return "" if isinstance(value, bool | np.bool_) else "True or False"
+    if is_array_type(kind):
+        return "" if _is_real(value, "Complex" in str(kind)) else "an array of numbers"
+    if is_plain_class(kind):
+        return "" if isinstance(value, kind) else f"of kind {kind.__name__}"
+    if origin is typing.Literal:
+        return (
+            "" if isinstance(value, str | int | None) and value in inside else f"one of {', '.join(map(str, inside))}"
+        )
     if origin is Callable:
         return "" if callable(value) else "something that can be called"
     if not inspect.isclass(origin) or not issubclass(origin, Mapping | Sequence):
@@ -144,36 +122,45 @@ def _wrong_one(kind: Any, value: Any) -> str:
             return "a mapping"
         said = [wrong(inside[1], each) for each in value.values()]
         return f"a mapping to what is {next(filter(None, said))}" if any(said) else ""
+    of_things = is_plain_class(inside[0]) and inside[0] not in (int, float, str)
     if isinstance(value, str | bytes) or not isinstance(value, Sequence | np.ndarray | jax.Array):
         return "a row of things"
-    of_things = is_plain_class(inside[0]) and inside[0] not in (int, float, str)
     if isinstance(value, _ARRAYS) and (of_things or np.ndim(value) == 0):
         return "a row of things"
-    each = inside[:1] * len(value) if issubclass(origin, tuple) is False or inside[-1] is ... else inside
+    each = inside[:1] * len(value) if not issubclass(origin, tuple) or inside[-1] is ... else inside
     if len(each) != len(value):
         return f"a row of {len(each)}"
     said = [wrong(kind, x, in_row=True) for kind, x in zip(each, value, strict=True)]
     return f"a row of things, each {next(filter(None, said))}" if any(said) else ""
 
 
+def _wrong_number(value: Any, may_miss: bool) -> str:
+    single = isinstance(value, int | float | np.number) or (isinstance(value, _ARRAYS) and np.ndim(value) == 0)
+    missing = isinstance(value, float) and math.isnan(value) and not may_miss
+    if not single or missing or isinstance(value, bool | np.bool_):
+        return "a number"
+    whole = type(value) is int and not -(2**63) <= value < 2**63
+    return "a number, of 64 bits if it is whole" if whole else ""
+
+
 def _is_traced(value: Any) -> bool:
-    """Whether a value, or anything in a row of them, is still to come."""
+    """True if a value, or anything in a row of them, is still to come."""
     return any(isinstance(x, Tracer) for x in (value if isinstance(value, tuple | list) else (value,)))
 
 
 def is_array_type(kind: Any) -> bool:
-    """Whether an annotation is one of jaxtyping's."""
+    """True for an annotation of jaxtyping."""
     return getattr(kind, "dim_str", None) is not None
 
 
 def is_plain_class(kind: Any) -> bool:
-    """Whether an annotation is a class whose instances can be told."""
+    """True for a class whose instances can be told."""
     simple = inspect.isclass(kind) and not is_array_type(kind) and typing.get_origin(kind) is None
     return simple and kind is not typing.Any and not getattr(kind, "_is_protocol", False)
 
 
 def _is_real(value: Any, with_imaginary: bool) -> bool:
-    """Whether an array holds numbers and nothing else."""
+    """True if an array holds numbers and nothing else."""
     if isinstance(value, np.ma.MaskedArray):
         return False
     try:
@@ -189,24 +176,6 @@ def _is_count(value: Any) -> bool:
     if isinstance(value, _ARRAYS) and np.ndim(value) == 0 and value.dtype.kind in "iu":
         value = int(value)
     return isinstance(value, int) and abs(value) <= MOST
-
-
-def _wrong_number(members: tuple[Any, ...], arrays: Sequence[Any], value: Any) -> str:
-    single = isinstance(value, int | float | np.number) or (isinstance(value, _ARRAYS) and np.ndim(value) == 0)
-    if not single:
-        or_array = any(m.dim_str != "" for m in arrays)
-        if or_array and _is_real(value, False):
-            return ""
-        others = tuple(m for m in members if is_plain_class(m) and m not in (int, float))
-        rows = [m for m in members if typing.get_origin(m) is not None]
-        if isinstance(value, others) or any(not _wrong_one(m, value) for m in rows):
-            return ""
-        return "a number or an array of numbers" if or_array else "a number or a row of them" if rows else "a number"
-    if isinstance(value, bool | np.bool_):
-        return "a number"
-    if type(value) is int and not -(2**63) <= value < 2**63:
-        return "a number, of 64 bits if it is whole"
-    return ""
 
 
 # Double precision is on, and JAX is of no version that is known to give wrong numbers.

@@ -39,18 +39,14 @@ SOURCES: dict[Kind, str] = {
 
 @dataclasses.dataclass(frozen=True)
 class ParameterInfo:
-    """What is known of a parameter beside its value: SI unit, closed range of sensible values, description, kind."""
+    """What is known of a parameter beside its value: SI unit, closed range of sensible values, description, source."""
 
     unit: str
     lower: float
     upper: float
     text: str
-    kind: Kind = "fixed"
-    """Who knows it."""
-    within: tuple[float, float] | None = None
-    """Range that an `unknown` one lies in, if nothing has been measured."""
     source: str = ""
-    """Where its value comes from; of an `unknown` one, what to measure."""
+    """Where its value comes from, or what to measure."""
 
 
 UNKNOWN = "?"
@@ -82,20 +78,18 @@ def parameter(
     text: str,
     *,
     kind: Kind = "fixed",
-    within: tuple[float, float] | None = None,
     source: str = "",
     **kwargs: Any,
 ) -> Any:
     """A differentiable leaf of a module, with `unit` (SI) and the closed range `[lower, upper]` users may give.
 
-    `kind` says who knows it, `within` in which range one lies that is unknown, `source` what to measure.
+    `kind` says who knows it, or `source` what to measure.
 
     **Raises:** `ValueError` for a unit that is not made of 1, rad, K, kg, m, s, N, Pa.
     """
     if unit != UNKNOWN:
         unit_dimensions(unit)
-    who: Kind = "unknown" if within else kind
-    info = ParameterInfo(unit, lower, upper, text, who, within, source or SOURCES[who])
+    info = ParameterInfo(unit, lower, upper, text, source or SOURCES[kind])
     return eqx.field(converter=functools.partial(_leaf_of, info), metadata={"parameter": info}, **kwargs)
 
 
@@ -292,22 +286,6 @@ def choice_paths(module: eqx.Module) -> dict[str, tuple[str, ...]]:
     return {".".join(path): path for path in found}
 
 
-def _with_static(module: Any, path: tuple[str, ...], value: Any) -> Any:
-    """A copy of `module` with the static field at `path` set."""
-    name, *rest = path
-    inner = _with_static(_part(module, name), tuple(rest), value) if rest else value
-    if isinstance(module, tuple):
-        return tuple(inner if type(each).__name__ == name else each for each in module)
-    return dataclasses.replace(module, **fields_from(type(module), {name: inner}, getattr(module, "forces", ())))
-
-
-def with_values(module: M, values: Mapping[str, PyTree]) -> M:
-    """A copy of `module` with parameters by name, whatever their ranges: limits in which a formula is known."""
-    paths = parameter_paths(module)
-    at = lambda m: [get(m, paths[name]) for name in values]
-    return eqx.tree_at(at, module, [jax.tree.map(_as_leaf, value) for value in values.values()])
-
-
 def replace(module: M, **values: PyTree) -> M:
     """A copy of `module` with named parts replaced.
 
@@ -318,32 +296,43 @@ def replace(module: M, **values: PyTree) -> M:
     **Raises:** `ValueError` for a name the module does not have, or an option a choice does not offer.
     """
     _require_module(module)
-    leaves, choices = parameter_paths(module), choice_paths(module)
-    parts = [f.name for f in dataclasses.fields(module) if isinstance(getattr(module, f.name), eqx.Module)]
+    paths, fields = parameter_paths(module) | choice_paths(module), dict(walk(module))
+    parts = {f.name for f in dataclasses.fields(module) if isinstance(getattr(module, f.name), eqx.Module)}
     if laws := getattr(module, "forces", ()):
-        named = {part_path(law)[0]: None for law in (*laws, *values.values())}
-        parts += ["forces", *({EXTRA: None} | named)]
-    fields = dict(walk(module))
+        parts |= {"forces", EXTRA, *(part_path(law)[0] for law in (*laws, *values.values()))}
     for name, value in values.items():
-        if not any(name in known for known in (parts, leaves, choices)):
-            known = ", ".join([*leaves, *choices, *sorted(parts)])
+        if name in parts:
+            continue
+        if name not in paths:
+            known = ", ".join([*paths, *sorted(parts)])
             raise ArgumentError(name, said=f"must name a part of the model, one of: {known}.")
-        offered = fields[choices[name]].metadata.get("choice") if name in choices else None
-        if offered and value not in offered:
+        metadata = fields[paths[name]].metadata
+        if (offered := metadata.get("choice")) and value not in offered:
             raise ArgumentError(name, said=f"must be one of {', '.join(offered)}, but {value!r} was given.")
-        if name in leaves and name not in parts:
-            _require_range(name, value, fields[leaves[name]].metadata["parameter"])
-    if exchanged := {name: values[name] for name in parts if name in values}:
-        module = _with_parts(module, exchanged)
-    if changed := {name: values[name] for name in leaves if name in values and name not in parts}:
-        module = with_values(module, changed)
-    # Last, and those of the module itself at once: what is checked is what was asked for, and not a half of it.
-    own = {name: values[name] for name, path in choices.items() if name in values and len(path) == 1}
-    module = dataclasses.replace(module, **own) if own else _checked(module)
-    for name, path in choices.items():
-        if name in values and name not in own:
-            module = _with_static(module, path, values[name])
-    return module
+        if info := metadata.get("parameter"):
+            _require_range(name, value, info)
+    return _changed(module, {(name,) if name in parts else paths[name]: value for name, value in values.items()})
+
+
+def _changed(module: Any, changes: Mapping[tuple[str, ...], Any]) -> Any:
+    """A copy of `module` with what is at these paths changed. Each part is checked once, with all of its changes."""
+    parts: dict[str, Any] = {}
+    for name in dict.fromkeys(path[0] for path in changes):
+        whole = changes[(name,)] if (name,) in changes else _part(module, name)
+        inside = {path[1:]: value for path, value in changes.items() if path[0] == name and len(path) > 1}
+        parts[name] = _changed(whole, inside) if inside else whole
+    if isinstance(module, tuple):
+        return tuple(parts.get(type(each).__name__, each) for each in module)
+    given, copy = fields_from(type(module), parts, getattr(module, "forces", ())), object.__new__(type(module))
+    for field in dataclasses.fields(module):
+        value = getattr(module, field.name)
+        if field.name in given:
+            value = field.metadata.get("converter", lambda x: x)(given[field.name])
+        object.__setattr__(copy, field.name, value)
+    for kind in type(module).__mro__:
+        if check := vars(kind).get("__check_init__"):
+            check(copy)
+    return copy
 
 
 def allowed(info: ParameterInfo) -> str:
@@ -373,25 +362,6 @@ def _require_range(name: str, value: Any, info: ParameterInfo) -> None:
     if wrong.size:
         unit = "" if info.unit in ("1", UNKNOWN) else f" {info.unit}"
         raise ArgumentError(name, said=f"{allowed(info)}, but is {wrong.flat[0]:g}{unit}.")
-
-
-def _with_parts(module: M, parts: dict[str, Any]) -> M:
-    """A copy of `module` with whole parts exchanged, not asked yet whether they go together."""
-    copy = object.__new__(type(module))
-    given = fields_from(type(module), parts, getattr(module, "forces", ()))
-    for field in dataclasses.fields(module):
-        value = given.get(field.name, getattr(module, field.name))
-        convert = field.metadata.get("converter", lambda x: x)
-        object.__setattr__(copy, field.name, convert(value) if field.name in given else value)
-    return copy
-
-
-def _checked(module: M) -> M:
-    """`module`, of which tree surgery has not asked whether its parts go together."""
-    for kind in type(module).__mro__:
-        if check := vars(kind).get("__check_init__"):
-            check(module)
-    return module
 
 
 Parameter = str | Callable[[Any], Any]
@@ -428,38 +398,3 @@ def _by_field_name(model: Any) -> dict[str, tuple[str, ...]]:
             paths.append(names)
     last = [path[-1] for path in paths]
     return {(path[-1] if last.count(path[-1]) == 1 else ".".join(path)): path for path in paths}
-
-
-def printed(model: eqx.Module) -> str:
-    """One line for every parameter, choice and count of `model`: name, value, unit, where it comes from."""
-    rows = [_row(".".join(path), get(model, path), field.metadata) for path, field in walk(model)]
-    widths = [max(len(row[i]) for row in rows) for i in range(3)]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row[:3], widths, strict=True)) for row in rows]
-    said = [f"  {line}  {row[3]}".rstrip() for line, row in zip(lines, rows, strict=True)]
-    return "\n".join([f"{type(model).__name__}, values in SI units", *said])
-
-
-def _row(name: str, value: Any, metadata: Any) -> tuple[str, str, str, str]:
-    info: ParameterInfo | None = metadata.get("parameter")
-    if info is None:
-        said = metadata.get("readings", {}).get(value, metadata.get("text", ""))
-        return name, str(value), "", said
-    unit = "" if info.unit in ("1", "?") else info.unit
-    return name, _number(value), unit, _source(info)
-
-
-def _number(value: Any) -> str:
-    try:
-        known = np.asarray(value, dtype=float)
-    except Exception:  # traced, or a placeholder of tree surgery
-        return "traced"
-    if known.ndim == 0:
-        return f"{float(known):.6g}"
-    return f"{np.min(known):.6g} to {np.max(known):.6g} ({known.size} values)"
-
-
-def _source(info: ParameterInfo) -> str:
-    if info.kind != "unknown" or info.within is None:
-        return f"{info.kind}: {info.source}"
-    low, high = info.within
-    return f"unknown, {low:g} to {high:g} if not measured: {info.source}"

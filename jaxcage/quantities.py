@@ -125,13 +125,9 @@ _QUANTITIES = (
     Quantity("outcome", "", "1", "how the integration of each lane ended"),
     Quantity("label", "", "1", "what each lane does"),
     Quantity("chaotic_share", "", "1", "share of the finished lanes that are chaotic while observed"),
-    Quantity("force", r"$F$", "N", "force"),
-    Quantity("contact_force", r"$Q_{cw}$", "N", "roller-bar contact force"),
-    Quantity("bar_force", r"$K_c \delta_c$", "N", "bar force"),
 )
 
 GLOSSARY: dict[str, Quantity] = {quantity.name: quantity for quantity in _QUANTITIES}
-"""Quantities by name."""
 
 
 def quantity(name: str) -> Quantity:
@@ -145,10 +141,9 @@ _COMPONENTS = {
 }
 
 
-def component_names(dimension: int, cage: bool = True) -> tuple[str, ...]:
+def component_names(dimension: int) -> tuple[str, ...]:
     """Names of the state components of a cage; those of another system are numbered."""
-    numbered = tuple(f"y{i}" for i in range(dimension))
-    return _COMPONENTS.get(dimension, numbered) if cage else numbered
+    return _COMPONENTS.get(dimension) or tuple(f"y{i}" for i in range(dimension))
 
 
 def notebook_html(self: Any) -> str:

@@ -15,32 +15,32 @@ def kinetic_energy(at: BearingAtSpeed, state: BearingState) -> Array:
     square = rollers.radial**2 + (rollers.radius * rollers.orbit) ** 2
     of_rollers = jnp.sum(at.roller_mass * square + at.roller_inertia * rollers.spin**2) / 2
     vx, vy = mass_centre(at, state)[2:]
-    of_cage = (at.cage_mass * (vx * vx + vy * vy) + at.cage_inertia * cage.cage_speed**2) / 2
-    return of_rollers + of_cage + at.ring_mass * (cage.ring_vx**2 + cage.ring_vy**2) / 2
+    of_cage = (at.model.cage_mass * (vx * vx + vy * vy) + at.model.cage_inertia * cage.cage_speed**2) / 2
+    return of_rollers + of_cage + at.model.ring.ring_mass * (cage.ring_vx**2 + cage.ring_vy**2) / 2
 
 
 def potential_energy(at: BearingAtSpeed, state: BearingState) -> Array:
     """Of weight, load and all contacts [J]."""
     rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
-    geometry = at.geometry(state)
-    weight = at.cage_mass * mass_centre(at, state)[1] + at.ring_mass * cage.ring_y
+    geometry = at.forces(state).geometry
+    weight = at.model.cage_mass * mass_centre(at, state)[1] + at.model.ring.ring_mass * cage.ring_y
     weight = weight + at.roller_mass * jnp.sum(rollers.radius * geometry.sin)
-    return weight * at.gravity + at.load * cage.ring_y + contact_energies(at, state)
+    return weight * at.model.gravity + at.model.load * cage.ring_y + contact_energies(at, state)
 
 
 def contact_energies(at: BearingAtSpeed, state: BearingState) -> Array:
     """Elastic energy of raceways, pockets and land [J]."""
     rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
-    g, half, law = at.geometry(state), at.pocket.half, at.pocket.law
+    g, half, law = at.forces(state).geometry, at.outer_race.half, at.model.pockets
     stiffness, width = at.outer_race.stiffness, at.outer_race.smoothing
     energy = jax.vmap(contact_energy, in_axes=(0, None, None))
     outer = energy(rollers.radius + half - at.outer_race.radius, width, 10 / 9)
     inner = energy(at.inner_race.radius + half - g.distance, width, 10 / 9)
     along = rollers.radius * g.lag_sin - (cage.y * g.pocket_cos - cage.x * g.pocket_sin)
     exponent = 1.0 if law.pocket_law == "linear" else law.pocket_exponent
-    bar = energy(jnp.abs(along) - at.pocket.clearance / 2, law.pocket_smoothing, exponent)
+    bar = energy(jnp.abs(along) - at.model.bearing.pocket_clearance / 2, law.pocket_smoothing, exponent)
     bar = law.pocket_stiffness * law.pocket_reference ** (1 - exponent) * bar
-    dx, dy = (cage.x - cage.ring_x, cage.y - cage.ring_y) if at.inner_guided else (cage.x, cage.y)
+    dx, dy = (cage.x - cage.ring_x, cage.y - cage.ring_y) if at.model.guidance == "inner" else (cage.x, cage.y)
     land, c = at.guide.land, at.guide.land.clearance
     depth = c * land.place(dx, dy, 0.0, 0.0).gap
     touch = at.guide.contact.stiffness * contact_energy(depth, c * land.onset_width)
@@ -49,7 +49,7 @@ def contact_energies(at: BearingAtSpeed, state: BearingState) -> Array:
 
 def mass_centre(at: BearingAtSpeed, state: BearingState) -> tuple[Array, Array, Array, Array]:
     """Place [m] and velocity [m/s] of the cage's mass centre."""
-    cage, e = Bodies(*state.bodies), at.eccentricity
+    cage, e = Bodies(*state.bodies), at.model.eccentricity
     cos, sin = cos_sin(state.clock[0])
     turn = e * cage.cage_speed
     x, y = jnp.asarray(cage.x + e * cos), jnp.asarray(cage.y + e * sin)
@@ -59,7 +59,9 @@ def mass_centre(at: BearingAtSpeed, state: BearingState) -> tuple[Array, Array, 
 def cage_angular_momentum(at: BearingAtSpeed, state: BearingState) -> Array:
     """About the outer ring's centre [N m s]."""
     x, y, vx, vy = mass_centre(at, state)
-    return jnp.asarray(at.cage_mass * (x * vy - y * vx) + at.cage_inertia * Bodies(*state.bodies).cage_speed)
+    return jnp.asarray(
+        at.model.cage_mass * (x * vy - y * vx) + at.model.cage_inertia * Bodies(*state.bodies).cage_speed
+    )
 
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(20)

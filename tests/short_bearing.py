@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 from scipy.optimize import brentq
 
-from jaxcage.forces import FilmModel, short_film_force
+from jaxcage.forces import FilmModel, arc_centre, film_drive, film_resistance
 
 
 Scalar = Any
@@ -56,6 +56,19 @@ class FilmCoefficients(NamedTuple):
     """-dF_i/dv_j in units of W/(c omega)."""
 
 
+def short_film_force(model: FilmModel, r: Any, v: Any, omega: Scalar = 1.0, smoothing: float = 1e-9) -> Array:
+    """Force of the film in units of S = mu R L^3 / c^2, times 1/s: -(1/2) M P.
+
+    **Arguments:** `model`; position and velocity of the cage centre over clearance [-, 1/s]; cage speed [rad/s];
+    `smoothing`, a small length over clearance.
+    """
+    (x, y), (px, py) = r, film_drive(*r, *v, omega)
+    per_eps = 1 / jnp.sqrt(x * x + y * y + smoothing * smoothing)
+    n = x * per_eps, y * per_eps
+    m = film_resistance(model, x, y, n, arc_centre(model, n, (px, py), smoothing * omega))
+    return -jnp.stack([m.xx * px + m.xy * py, m.xy * px + m.yy * py]) / 2
+
+
 def film_coefficients(eccentricity_ratio: Scalar, film: FilmModel = "fixed_half") -> FilmCoefficients:
     """Static equilibrium and dimensionless dynamic coefficients, by differentiating the film force.
 
@@ -67,7 +80,7 @@ def film_coefficients(eccentricity_ratio: Scalar, film: FilmModel = "fixed_half"
     eps = jnp.asarray(eccentricity_ratio, dtype=float)
 
     def force(r: Array, v: Array) -> Array:
-        return jnp.stack(short_film_force(film, r[0], r[1], v[0], v[1], 1.0, 0.0))
+        return short_film_force(film, r, v, 1.0, 0.0)
 
     still = jnp.zeros(2)
     radial, tangential = force(jnp.stack([eps, jnp.zeros(())]), still)

@@ -54,9 +54,6 @@ unwrap = inspect.unwrap
         (lambda: jc.bearing.Material("brass", 1e11, 0.3), "must be a number from .* but 'brass' was given"),
         (lambda: jc.ForcedOscillator(3, coordinates=1), "`acceleration` must be something that can be called, but 3"),
         (lambda: jc.ForcedSystem(DUFFING.acceleration, 2.5), "`dimension` must be a whole number"),
-        (lambda: jc.forces.film_scale(0.1, 1.0, 0.0, 1.0), "`width` must be positive and finite, but 0.0"),
-        (lambda: jc.forces.synchronous_force(tau=2**63, amplitude=1.0), "`tau` must be a number, of 64 bits"),
-        (lambda: jc.bearing.raceway_surface_speed(1.0, 0.0), "`raceway_diameter` must be positive and finite"),
     ],
 )
 def test_wrong_arguments_get_a_sentence(call: Callable[[], Any], said: str):
@@ -75,7 +72,7 @@ def test_wrong_arguments_get_a_sentence(call: Callable[[], Any], said: str):
     ids=["sweep", "simulate", "ramp", "periodic_orbit"],
 )
 def test_revolutions_per_minute_for_radians_are_refused(run):
-    with pytest.raises(ValueError, match=r"must be in rad/s, .* but 9000 was given, .* `jaxcage.rpm\(9000\)`"):
+    with pytest.raises(ValueError, match=r"must be in rad/s .* but 9000 was given, .* `jaxcage.rpm\(9000\)`"):
         run()
 
 

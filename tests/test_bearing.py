@@ -49,11 +49,16 @@ def test_discrete_rollers(clearance):
     assert float(result.half_angle) == pytest.approx(np.arccos(clearance / 2 / shift), rel=1e-6)
 
 
+def series_stiffness(bearing):
+    """Two raceways under the same load, (4)."""
+    return float(bearing.raceway_stiffness) / 2 ** (10 / 9)
+
+
 def test_contact_stiffness():
     per_millimetre = 1e3 ** (10 / 9)
-    assert float(jb.nu2310().contact_stiffness) / per_millimetre == pytest.approx(6.985e5, rel=1e-3)
+    assert series_stiffness(jb.nu2310()) / per_millimetre == pytest.approx(6.985e5, rel=1e-3)
     assert float(jb.nu2310().raceway_stiffness) / per_millimetre == pytest.approx(1.509e6, rel=1e-3)
-    assert float(crb209().contact_stiffness) / per_millimetre == pytest.approx(2.786e5, rel=1e-3)
+    assert series_stiffness(crb209()) / per_millimetre == pytest.approx(2.786e5, rel=1e-3)
 
 
 def test_sizes_and_forces_that_follow_from_table_1():
@@ -72,25 +77,19 @@ def test_sizes_and_forces_that_follow_from_table_1():
 @pytest.mark.parametrize("outer_speed", [0.0, 35.0])
 def test_cage_speed_is_rolling_between_the_raceway_speeds(outer_speed):
     bearing, inner_speed = jb.nu2310(), 200.0
-    inner = jb.raceway_surface_speed(inner_speed, bearing.inner_raceway_diameter)
-    outer = jb.raceway_surface_speed(outer_speed, bearing.outer_raceway_diameter)
-    cage = jb.cage_speed(inner_speed, outer_speed, 16e-3, 81e-3)
+    inner, outer = inner_speed * bearing.inner_raceway_diameter / 2, outer_speed * bearing.outer_raceway_diameter / 2
+    cage = bearing.cage_speed(inner_speed, outer_speed)
     assert float(cage) * 40.5e-3 == pytest.approx(float(inner + outer) / 2, rel=1e-12)
     assert float(cage) - outer_speed == pytest.approx((inner_speed - outer_speed) * 65 / 162, rel=1e-12)
     assert float(bearing.cage_speed(inner_speed)) == pytest.approx(inner_speed * float(bearing.cage_speed_ratio))
 
 
-@pytest.mark.parametrize("guidance, expected", [("outer_rib", 225e-6), ("inner_rib", 251.1e-6), ("roller", 326.1e-6)])
-def test_static_cage_displacement(guidance, expected):
+def test_static_cage_displacements():
     bearing = jb.nu2310()
-    found = jb.static_cage_displacement(
-        guidance,
-        guidance_gap=0.45e-3,
-        pocket_clearance=bearing.pocket_clearance,
-        radial_clearance=bearing.radial_clearance,
-        elastic_approach=jb.load_distribution(bearing, 4450.0).elastic_approach,
-    )
-    assert float(found) == pytest.approx(expected, rel=1e-3)
+    approach = jb.load_distribution(bearing, 4450.0).elastic_approach
+    found = jb.static_cage_displacements(bearing, 0.45e-3, approach)
+    expected = {"outer_rib": 225e-6, "inner_rib": 251.1e-6, "roller": 326.1e-6}
+    assert {name: float(y) for name, y in found.items()} == pytest.approx(expected, rel=1e-3)
 
 
 def test_published_table_2():
@@ -145,17 +144,15 @@ def test_distribution_repeats_after_one_roller_pitch():
 
 
 def test_series_stiffness_without_centrifugal_load():
-    inner, outer, approach = 3e9, 5e9, 4e-6
-    q_i, q_o = jb.raceway_loads(approach, inner, outer, 0.0)
-    expected = jb.line_contact_load(jb.series_stiffness(inner, outer), approach)
-    assert float(q_i) == pytest.approx(float(expected), rel=1e-12) == float(q_o)
+    bearing, approach = jb.nu2310(), 4e-6
+    q_i, q_o = jb.raceway_loads_of_all(jnp.array([approach]), bearing.raceway_stiffness, 0.0)
+    expected = series_stiffness(bearing) * approach ** (10 / 9)
+    assert float(q_i[0]) == pytest.approx(expected, rel=1e-12) == float(q_o[0])
 
 
-def test_zero_clearance_half_angle_is_90_degrees_with_exact_slope():
+def test_zero_clearance_half_angle_is_90_degrees():
     _, result = distribution(clearance=0.0)
     assert float(result.half_angle) == np.pi / 2
-    slope = jax.grad(jb.loaded_half_angle)(0.0, result.shaft_shift)
-    assert float(slope) == pytest.approx(-1 / (2 * float(result.shaft_shift)), rel=1e-12)
 
 
 @pytest.mark.parametrize("shaft_rpm", [0.0, 30000.0, 60000.0])
@@ -290,12 +287,6 @@ def test_impossible_loads_that_are_traced_give_nan():
     (lambda: jb.published_case("4c"), "one of 1a, 1b, 2a, 2b, 3a, 3b, but '4c' was given"),
     (lambda: crb209(bore=0.06), "must grow, but are 60, 55, 70, 85 mm"),
     (lambda: crb209(n_rollers=21), "21 rollers overlap on the pitch circle"),
-    (
-        lambda: jb.static_cage_displacement(
-            "shaft", guidance_gap=1e-3, pocket_clearance=1e-3, radial_clearance=1e-5, elastic_approach=1e-6
-        ),
-        "outer_rib, inner_rib, roller, but 'shaft' was given",
-    ),
 ])  # fmt: skip
 def test_impossible_bearings(call, message):
     with pytest.raises(ValueError, match=message):

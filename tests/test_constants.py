@@ -18,12 +18,12 @@ from jaxcage.models import CONSTANTS
 def test_constants_are_physical(name):
     """Priors: cage mass from its shape, lands that fit beside the rollers, dampers that damp."""
     c = CONSTANTS[name]
-    assert 0.20 <= c.cage_mass <= 0.36
-    assert 0 < c.land_width <= 6.5e-3
-    assert c.support_damping > 0 and c.support_stiffness > 0 and c.support_cubic > 0
-    assert 1 <= c.impact_exponent <= 2
-    assert 0 < c.restitution <= 1
-    assert 10 <= c.impact_amplitude <= 250  # fig. 5 peaks near 120 N
+    assert 0.20 <= c["cage_mass"] <= 0.36
+    assert 0 < c["land_width"] <= 6.5e-3
+    assert c["damping"] > 0 and c["stiffness"] > 0 and c["cubic_stiffness"] > 0
+    assert 1 <= c["exponent"] <= 2
+    assert 0 < c["restitution"] <= 1
+    assert 10 <= c["amplitude"] <= 250  # fig. 5 peaks near 120 N
 
 
 @pytest.mark.parametrize("name", CONSTANTS)

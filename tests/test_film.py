@@ -8,25 +8,15 @@ import numpy as np
 import pytest
 from reynolds import film_force
 from scipy.integrate import quad
+from short_bearing import short_film_force as force
 
 from jaxcage import replace
-from jaxcage.forces import (
-    film_drive,
-    film_pressure,
-    film_resistance,
-    half_circle_resistance,
-    short_film_force,
-    supply_force,
-)
+from jaxcage.forces import arc_centre, film_drive, film_resistance, half_circle_resistance
 from jaxcage.models import case
 
 
 MODELS = "fixed_half", "positive_pressure", "full"
 SMOOTHING = 1e-9
-
-
-def force(model, r, v, omega=1.0, smoothing=SMOOTHING):
-    return jnp.stack(short_film_force(model, r[0], r[1], v[0], v[1], omega, smoothing))
 
 
 def polar_state(eps, phi, eps_rate, phi_rate):
@@ -86,10 +76,9 @@ def test_force_is_the_integral_of_the_pressure(model, state):
 def test_pressure_solves_the_short_bearing_equation():
     """d/dz (h^3 dp/dz) = 6 mu (omega - 2 phi') dh/dalpha + 12 mu dh/dt, zero at the land's ends."""
     mu, width, c, eps, eps_rate, phi_rate, omega = 0.05, 4e-3, 4e-4, 0.6, 30.0, 110.0, 900.0
-    factor = 3 * mu * (width / c) ** 2
 
     def p(alpha, z):
-        return film_pressure(alpha, z / width, eps, eps_rate, phi_rate, omega, factor)
+        return 6 * mu * (width / c) ** 2 * (0.25 - (z / width) ** 2) * pressure(alpha, eps, eps_rate, phi_rate, omega)
 
     for alpha in (0.3, 1.9, 4.0):
         h = c * (1 + eps * np.cos(alpha))
@@ -105,9 +94,8 @@ def test_pressure_solves_the_short_bearing_equation():
 
 
 def matrix(model, r, v, omega=1.0, smoothing=SMOOTHING):
-    px, py = film_drive(r[0], r[1], v[0], v[1], omega)
-    n = np.asarray(r) / np.hypot(*r)
-    m = film_resistance(model, *r, tuple(n), px, py, omega, smoothing)
+    n = tuple(np.asarray(r) / np.hypot(*r))
+    m = film_resistance(model, *r, n, arc_centre(model, n, film_drive(*r, *v, omega), smoothing * omega))
     return np.array([[m.xx, m.xy], [m.xy, m.yy]], dtype=float)
 
 
@@ -134,11 +122,11 @@ def test_models_relate_through_half_circles():
     for eps, phi, *_ in random_states(6):
         x, y = eps * np.cos(phi), eps * np.sin(phi)
         n = np.cos(phi), np.sin(phi)
-        whole = np.array(film_resistance("full", x, y, n, 1.0, 0.0, 1.0, SMOOTHING))
+        whole = np.array(film_resistance("full", x, y, n, (0.0, 0.0)))
         ux, uy = np.cos(1.1), np.sin(1.1)
         halves = [np.array(half_circle_resistance(x, y, s * ux, s * uy)) for s in (1.0, -1.0)]
         np.testing.assert_allclose(halves[0] + halves[1], whole, rtol=1e-11)
-        fixed = np.array(film_resistance("fixed_half", x, y, n, 1.0, 0.0, 1.0, SMOOTHING))
+        fixed = np.array(film_resistance("fixed_half", x, y, n, (0.0, 0.0)))
         behind = np.array(half_circle_resistance(x, y, np.sin(phi), -np.cos(phi)))
         np.testing.assert_allclose(behind, fixed, rtol=1e-11, atol=1e-11 * np.abs(fixed).max())
 
@@ -186,8 +174,7 @@ def test_supply_pressure_pushes_with_its_projected_area(model, state):
     """Thrust 2 R L p_0 of (27): a uniform pressure over the half circle that carries the film."""
     omega = 1.3
     r, v, *_ = polar_state(*state)
-    px, py = film_drive(*r, *v, omega)
-    thrust = np.array(supply_force(model, tuple(r / np.hypot(*r)), px, py, omega, SMOOTHING))
+    thrust = -2 * np.array(arc_centre(model, tuple(r / np.hypot(*r)), film_drive(*r, *v, omega), SMOOTHING * omega))
     eps, phi, eps_rate, phi_rate = state
     ends = arcs(model, eps, eps_rate, phi_rate, omega)
     lo, hi = ends[0][0] + phi + np.pi, ends[-1][1] + phi + np.pi
@@ -280,7 +267,7 @@ def test_squeeze_of_a_long_film_in_closed_form():
 )
 def test_short_film_is_the_limit_of_narrow_lands(cavitation: str, short: str):
     r, v = (0.55, -0.2), (0.12, 0.05)
-    expected = np.array(short_film_force(short, *r, *v, 1.0))
+    expected = np.array(force(short, r, v))
     found = film_force(r, v, 1e-5, cavitation=cavitation, stations=1024, profiles=1)
     np.testing.assert_allclose(found, expected, rtol=0, atol=3e-5 * np.linalg.norm(expected))
 

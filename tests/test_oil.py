@@ -4,6 +4,7 @@ import jax
 import numpy as np
 import pytest
 
+import jaxcage
 import jaxcage.bearing as jb
 
 
@@ -22,15 +23,14 @@ def celsius(t):
     ],
 )
 def test_walther_against_published_extrapolations(first, second, target, published, tolerance):
-    found = jb.walther_viscosity(
-        celsius(target), first[1] * 1e-6, celsius(first[0]), second[1] * 1e-6, celsius(second[0])
-    )
+    points = (x for t, nu in (first, second) for x in (nu * 1e-6, celsius(t)))
+    found = jb.Lubricant(870.0, *points, temperature=celsius(target)).kinematic_viscosity
     assert float(found) * 1e6 == pytest.approx(published, rel=tolerance)
 
 
 @pytest.mark.parametrize("temperature, viscosity", [(313.15, 56e-6), (373.15, 7.5e-6)])
 def test_walther_passes_through_both_points(temperature, viscosity):
-    found = jb.walther_viscosity(temperature, 56e-6, 313.15, 7.5e-6, 373.15)
+    found = jb.Lubricant(870.0, 56e-6, 313.15, 7.5e-6, 373.15, temperature).kinematic_viscosity
     assert float(found) == pytest.approx(viscosity, rel=1e-14)
 
 
@@ -103,6 +103,11 @@ def test_an_oil_thinner_than_its_law_allows_is_doubted():
 def test_impossible_oils(oil, said):
     with pytest.raises(ValueError, match=said):
         oil()
+
+
+def test_a_part_of_a_model_is_compared_when_its_numbers_are_replaced():
+    with pytest.raises(ValueError, match="must not rise with the temperature"):
+        jaxcage.replace(jaxcage.case("1a"), viscosity_2=1e-4)
 
 
 def test_an_oil_of_constant_viscosity():

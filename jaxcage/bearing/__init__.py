@@ -9,7 +9,6 @@
 | `catalogue` | bearings by designation; the six published cases and the axis limits of the published figures |
 """
 
-from .._arguments import check_layer
 from .catalogue import (
     BEARINGS as BEARINGS,
     PUBLISHED_CASES as PUBLISHED_CASES,
@@ -23,33 +22,17 @@ from .geometry import (
     Material as Material,
     bearing_steel as bearing_steel,
     brass as brass,
-    cage_speed as cage_speed,
     design_rule_violations as design_rule_violations,
-    raceway_surface_speed as raceway_surface_speed,
 )
 from .line_contact import (
     PALMGREN_CONSTANT as PALMGREN_CONSTANT,
     line_contact_approach as line_contact_approach,
-    line_contact_load as line_contact_load,
     line_contact_stiffness as line_contact_stiffness,
-    raceway_loads as raceway_loads,
     raceway_loads_of_all as raceway_loads_of_all,
-    series_stiffness as series_stiffness,
 )
-from .oil import Lubricant as Lubricant, vg as vg, walther_viscosity as walther_viscosity
+from .oil import Lubricant as Lubricant, vg as vg
 from .statics import (
-    Guidance as Guidance,
     LoadDistribution as LoadDistribution,
     load_distribution as load_distribution,
-    loaded_half_angle as loaded_half_angle,
-    roller_angles as roller_angles,
-    static_cage_displacement as static_cage_displacement,
-)
-
-
-check_layer(
-    globals(),
-    "cage_speed design_rule_violations line_contact_approach line_contact_load line_contact_stiffness "
-    "load_distribution loaded_half_angle published_case raceway_loads raceway_surface_speed roller_angles "
-    "series_stiffness static_cage_displacement vg walther_viscosity",
+    static_cage_displacements as static_cage_displacements,
 )

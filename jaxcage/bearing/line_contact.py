@@ -5,7 +5,6 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array
 
-from .._arguments import require_above_zero
 from .._pytrees import Scalar
 
 
@@ -27,7 +26,6 @@ def line_contact_stiffness(palmgren_constant: Scalar, length: Scalar) -> Array:
 
     **Returns:** K [N/m^(10/9)].
     """
-    require_above_zero(palmgren_constant=palmgren_constant)
     return jnp.asarray(palmgren_constant * _power(length, 8 / 9))
 
 
@@ -47,52 +45,33 @@ def line_contact_approach(stiffness: Scalar, load: Scalar) -> Array:
     return _power(load / stiffness, 1 / LINE_CONTACT_EXPONENT)
 
 
-def series_stiffness(inner: Scalar, outer: Scalar) -> Array:
-    """Stiffness of two contacts under the same load, (K_i^-0.9 + K_o^-0.9)^(-10/9), from (4).
-
-    **Arguments, returns:** stiffnesses [N/m^(10/9)].
-    """
-    compliance = _power(inner, -1 / LINE_CONTACT_EXPONENT) + _power(outer, -1 / LINE_CONTACT_EXPONENT)
-    return _power(compliance, -LINE_CONTACT_EXPONENT)
-
-
-def _inner_share(total: Array, inner: Array, outer: Array, centrifugal: Array) -> Array:
-    """Share of the inner contact in the total approach of a loaded roller.
-
-    It solves x + delta_o(x)/total = 1. The left side is convex and increasing, and the start is at or above the root,
-    so that Newton's method descends to it.
-    """
-
-    def residual(x: Array, args: tuple[Array, ...]) -> Array:
-        total, inner, outer, centrifugal = args
-        load = line_contact_load(inner, x * total) + centrifugal
-        return x + line_contact_approach(outer, load) / total - 1
-
-    args = total, inner, outer, centrifugal
-    start = 1 - line_contact_approach(outer, centrifugal) / total
-    solver = optx.Newton(rtol=1e-13, atol=1e-13)
-    return optx.root_find(residual, solver, start, args, max_steps=64, throw=False).value
-
-
-def raceway_loads(approach: Scalar, inner: Scalar, outer: Scalar, centrifugal: Scalar) -> tuple[Array, Array]:
+def raceway_loads(approach: Scalar, stiffness: Scalar, centrifugal: Scalar) -> tuple[Array, Array]:
     """Loads of one roller on both raceways under a given approach of the raceways, (3), (4), (10).
 
     The centrifugal force acts on the outer raceway only: Q_o = Q_i + F_cen. The approach splits as
-    delta = (Q_i/K_i)^0.9 + ((Q_i + F_cen)/K_o)^0.9, which is solved for Q_i. A roller that F_cen presses into the outer
-    raceway by more than delta is clear of the inner one, Q_i = 0.
+    delta = (Q_i/K)^0.9 + ((Q_i + F_cen)/K)^0.9, which is solved for the share x of the inner contact,
+    x + delta_o(x)/delta = 1. The left side is convex and increasing, and the start is at or above the root, so that
+    Newton's method descends to it. A roller that F_cen presses into the outer raceway by more than delta is clear of
+    the inner one, Q_i = 0.
 
-    **Arguments:** total approach [m] (negative: apart), stiffnesses [N/m^(10/9)], centrifugal force [N].
+    **Arguments:** total approach [m] (negative: apart), stiffness of one raceway [N/m^(10/9)], centrifugal force [N].
 
     **Returns:** Q_i and Q_o [N].
     """
-    total, inner, outer, centrifugal = (jnp.asarray(x, dtype=float) for x in (approach, inner, outer, centrifugal))
-    seat = line_contact_approach(outer, centrifugal)
+    total, stiffness, centrifugal = (jnp.asarray(x, dtype=float) for x in (approach, stiffness, centrifugal))
+    seat = line_contact_approach(stiffness, centrifugal)
     loaded = total > seat
     # An unloaded roller solves a harmless stand-in, so that no value or gradient is NaN.
     stand_in = jnp.where(loaded, total, 1 + 2 * seat)
-    share = _inner_share(stand_in, inner, outer, centrifugal)
-    load = jnp.where(loaded, line_contact_load(inner, share * stand_in), 0.0)
+
+    def residual(x: Array, _: None) -> Array:
+        load = line_contact_load(stiffness, x * stand_in) + centrifugal
+        return x + line_contact_approach(stiffness, load) / stand_in - 1
+
+    solver, start = optx.Newton(rtol=1e-13, atol=1e-13), 1 - seat / stand_in
+    share = optx.root_find(residual, solver, start, None, max_steps=64, throw=False).value
+    load = jnp.where(loaded, line_contact_load(stiffness, share * stand_in), 0.0)
     return load, load + centrifugal
 
 
-raceway_loads_of_all = eqx.filter_vmap(raceway_loads, in_axes=(0, None, None, None))
+raceway_loads_of_all = eqx.filter_vmap(raceway_loads, in_axes=(0, None, None))

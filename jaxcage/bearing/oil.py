@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from .._arguments import is_concrete, require_above_zero
-from .._errors import ArgumentError
+from .._arguments import is_concrete
+from .._errors import ArgumentError, shown
 from .._parameters import ROUNDING, parameter
 from .._pytrees import Scalar
 
@@ -23,33 +23,6 @@ CELSIUS_100 = 373.15
 WALTHER_CONSTANT = 0.7
 THINNEST = 2e-6
 """Kinematic viscosity above which the law of Walther holds [m^2/s]."""
-
-
-def walther_viscosity(
-    temperature: Scalar,
-    viscosity_1: Scalar,
-    temperature_1: Scalar,
-    viscosity_2: Scalar,
-    temperature_2: Scalar,
-    reference: Scalar = 1e-6,
-) -> Array:
-    """Kinematic viscosity by ASTM D341 (Walther): lg lg(nu/nu_0 + 0.7) is linear in lg T.
-
-    The constants of the line come from the two points, so the value at `temperature_1` is `viscosity_1` whatever the
-    second point is. The form holds above 2 mm^2/s, where the further terms of the standard vanish.
-
-    **Arguments:** temperatures [K], viscosities [m^2/s]; `reference` is nu_0 = 1 mm^2/s [m^2/s], the unit inside the
-    double logarithm, an argument so that it can be differentiated and rescaled like every dimensional constant.
-
-    **Returns:** kinematic viscosity [m^2/s].
-    """
-    require_above_zero(temperature=temperature, temperature_1=temperature_1, temperature_2=temperature_2)
-    require_above_zero(viscosity_1=viscosity_1, viscosity_2=viscosity_2)
-    nu_0 = jnp.asarray(reference, dtype=float)
-    w1 = jnp.log(jnp.log(viscosity_1 / nu_0 + WALTHER_CONSTANT))
-    w2 = jnp.log(jnp.log(viscosity_2 / nu_0 + WALTHER_CONSTANT))
-    fraction = jnp.log(temperature / temperature_1) / jnp.log(temperature_2 / temperature_1)
-    return nu_0 * (jnp.exp(jnp.exp(w1 + (w2 - w1) * fraction)) - WALTHER_CONSTANT)
 
 
 class Lubricant(eqx.Module):
@@ -62,7 +35,7 @@ class Lubricant(eqx.Module):
     temperature_2: Scalar = parameter("K", 200.0, 600.0, "temperature of the second point", kind="oil")
     temperature: Scalar = parameter("K", 200.0, 600.0, "operating temperature", kind="operating", default=CELSIUS_40)
     reference_viscosity: Scalar = parameter(
-        "m^2/s", 1e-7, 1e-5, "1 mm^2/s, the unit in the double logarithm of ASTM D341", kind="fixed", default=1e-6
+        "m^2/s", 1e-7, 1e-5, "1 mm^2/s, the unit in the double logarithm of ASTM D341", default=1e-6
     )
 
     def __check_init__(self) -> None:
@@ -84,15 +57,17 @@ class Lubricant(eqx.Module):
 
     @property
     def kinematic_viscosity(self) -> Array:
-        """Kinematic viscosity at the operating temperature [m^2/s]."""
-        return walther_viscosity(
-            self.temperature,
-            self.viscosity_1,
-            self.temperature_1,
-            self.viscosity_2,
-            self.temperature_2,
-            self.reference_viscosity,
-        )
+        """Kinematic viscosity at the operating temperature [m^2/s], by ASTM D341 (Walther).
+
+        lg lg(nu/nu_0 + 0.7) is linear in lg T, with nu_0 = 1 mm^2/s. The constants of the line come from the two
+        points, so the value at `temperature_1` is `viscosity_1` whatever the second point is. The form holds above
+        2 mm^2/s, where the further terms of the standard vanish.
+        """
+        nu_0 = jnp.asarray(self.reference_viscosity, dtype=float)
+        w1, w2 = (jnp.log(jnp.log(nu / nu_0 + WALTHER_CONSTANT)) for nu in (self.viscosity_1, self.viscosity_2))
+        span = jnp.log(self.temperature_2 / self.temperature_1)
+        fraction = jnp.log(self.temperature / self.temperature_1) / span
+        return nu_0 * (jnp.exp(jnp.exp(w1 + (w2 - w1) * fraction)) - WALTHER_CONSTANT)
 
     @property
     def dynamic_viscosity(self) -> Array:
@@ -119,7 +94,8 @@ def vg(grade: Scalar, temperature: Scalar = CELSIUS_40) -> Lubricant:
 
     **Arguments:** grade [mm^2/s at 40 C], operating temperature [K].
     """
-    require_above_zero(grade=grade, temperature=temperature)
+    if is_concrete(grade) and not np.all((np.asarray(grade) > 0) & np.isfinite(grade)):
+        raise ArgumentError("grade", said=f"must be positive and finite, but {shown(grade)} was given.")
     given: Any = np.asarray(grade, dtype=float) if is_concrete(grade) else grade  # NumPy compiles no program
     return Lubricant(
         density=870.0,

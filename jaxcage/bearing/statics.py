@@ -1,6 +1,6 @@
 """Distribution of the load over the rollers, and where the cage rests: paper eqs. (1), (2), (5), (6), (10)."""
 
-from typing import Literal, get_args
+from functools import partial
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -8,14 +8,12 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
-from .._arguments import is_concrete, require_above_zero, require_at_least, require_x64
+from .._arguments import is_concrete, require_x64
 from .._errors import ArgumentError
 from .._pytrees import Scalar
 from .geometry import Bearing
 from .line_contact import line_contact_approach, raceway_loads_of_all
 
-
-Guidance = Literal["outer_rib", "inner_rib", "roller"]
 
 LARGEST = 1e12
 """Largest load that is accepted [N]."""
@@ -42,126 +40,65 @@ class LoadDistribution(eqx.Module):
     With that roller at the bottom it is delta_s - G_r/2. It holds the centrifugal part, (10).
     """
     half_angle: Float[Array, ""]
-    """Half angle of the loaded zone, (2), at whose ends a roller just touches the inner raceway [rad]."""
+    """Half angle of the loaded zone, at whose ends a roller just touches the inner raceway [rad].
 
-
-def roller_angles(n_rollers: int, first_angle: Scalar = -jnp.pi / 2) -> Float[Array, " rollers"]:
-    """Angles of equally spaced rollers from +x, counter-clockwise, the first at `first_angle` [rad]."""
-    require_at_least(1, n_rollers=n_rollers)
-    return jnp.asarray(first_angle) + 2 * jnp.pi / n_rollers * jnp.arange(n_rollers, dtype=float)
-
-
-def loaded_half_angle(radial_clearance: Scalar, shaft_shift: Scalar) -> Array:
-    """Half angle of the loaded zone, acos(G_r/(2 delta_s)) [rad]: the clean form of (2).
-
-    The paper prints this as the whole angle and with delta_r, the elastic approach, in place of the shift of the shaft
-    delta_s = delta_r + G_r/2; the geometry asks for both corrections.
-
-    **Arguments:** radial clearance G_r [m], to which twice the approach of the rollers to the outer raceway is added
-    that their centrifugal force makes, as it shrinks the zone; shift of the shaft [m].
-    """
-    return jnp.arccos(radial_clearance / (2 * shaft_shift))
-
-
-def static_cage_displacement(
-    guidance: str,
-    *,
-    guidance_gap: Scalar,
-    pocket_clearance: Scalar,
-    radial_clearance: Scalar,
-    elastic_approach: Scalar,
-) -> Array:
-    """Distance of the resting cage below the bearing centre: (1) outer rib, (5) inner rib, (6) roller.
-
-    **Arguments:** `Guidance`, then C_r, T, G_r and delta_r [m]. delta_r is the elastic approach at the most loaded
-    roller, delta_r + G_r/2 the shift of the shaft. An outer rib needs C_r alone.
-
-    **Returns:** C_r/2, delta_r + G_r/2 + C_r/2 or delta_r + G_r/2 + T [m].
-
-    **Raises:** `ValueError` for another kind of guidance.
-    """
-    require_x64()
-    require_above_zero(guidance_gap=guidance_gap)
-    shift = elastic_approach + radial_clearance / 2
-    if guidance == "outer_rib":
-        return jnp.asarray(guidance_gap / 2)
-    if guidance == "inner_rib":
-        return jnp.asarray(shift + guidance_gap / 2)
-    if guidance == "roller":
-        return jnp.asarray(shift + pocket_clearance)
-    raise ArgumentError("guidance", said=f"must be one of {', '.join(get_args(Guidance))}, but {guidance!r} was given.")
-
-
-class _LoadCase(eqx.Module):
-    """A bearing under load, with what the root find needs beside the unknown."""
-
-    bearing: Bearing
-    load: Array
-    centrifugal: Array
-    cosines: Float[Array, " rollers"]
-
-    @property
-    def seat(self) -> Array:
-        """Approach of a roller to the outer raceway under its centrifugal force alone, (10) [m]."""
-        return line_contact_approach(self.bearing.raceway_stiffness, self.centrifugal)
-
-    @property
-    def bound(self) -> Array:
-        """Excess at which the roller nearest to the load would carry it alone, plus 1 % [m]."""
-        stiffness = self.bearing.raceway_stiffness
-        force = self.load / jnp.max(self.cosines)
-        inner = line_contact_approach(stiffness, force)
-        outer = line_contact_approach(stiffness, force + self.centrifugal)
-        return 1.01 * (inner + outer - self.seat)
-
-    def shift(self, excess: Array) -> Array:
-        """Shift of the shaft [m] that gives the nearest roller an approach of seat + excess."""
-        play = self.bearing.radial_clearance / 2 + self.seat
-        return (excess + play) / jnp.max(self.cosines)
-
-    def raceway_loads(self, excess: Array) -> tuple[Array, Array]:
-        """Q_i and Q_o of every roller [N], by delta_s cos(psi) - G_r/2 without cancellation at the nearest one."""
-        stiffness = self.bearing.raceway_stiffness
-        ratio = self.cosines / jnp.max(self.cosines)
-        play = self.bearing.radial_clearance / 2 + self.seat
-        approaches = self.seat + excess * ratio - play * (1 - ratio)
-        return raceway_loads_of_all(approaches, stiffness, stiffness, self.centrifugal)
-
-
-def _solve_excess(case: _LoadCase) -> Array:
-    """Excess of the nearest roller at which the rollers carry the load [m]; NaN where there is no such excess.
-
-    The forces rise steadily but have kinks: the root is found by bisection and differentiated implicitly. At zero
-    excess no roller is loaded and at the bound one alone carries the load, so that the root is enclosed.
+    acos(G_r/(2 delta_s)), the clean form of (2): the paper prints this as the whole angle and with delta_r, the elastic
+    approach, in place of the shift of the shaft delta_s = delta_r + G_r/2. To G_r is added twice the approach of the
+    rollers to the outer raceway that their centrifugal force makes, as it shrinks the zone.
     """
 
-    def imbalance(fraction: Array, case: _LoadCase) -> Array:
-        inner, _ = case.raceway_loads(fraction * case.bound)
-        return jnp.sum(inner * case.cosines) / case.load - 1
 
-    solver = optx.Bisection(rtol=1e-12, atol=1e-11, flip=False)
-    start, interval = jnp.asarray(0.5), dict(lower=0.0, upper=1.0)
-    # Without `throw`, which would put a callback to Python into every program and keep it from being cached on disk.
-    root = optx.root_find(imbalance, solver, start, case, options=interval, max_steps=128, throw=False)
-    found = (root.result == optx.RESULTS.successful) & (case.load > 0) & (case.centrifugal >= 0)
-    return jnp.where(found, root.value * case.bound, jnp.nan)
+def static_cage_displacements(bearing: Bearing, guidance_gap: Scalar, elastic_approach: Scalar) -> dict[str, Scalar]:
+    """Distance of the resting cage below the bearing centre, by the ring that guides it [m].
+
+    (1) outer rib C_r/2, (5) inner rib delta_r + G_r/2 + C_r/2, (6) roller delta_r + G_r/2 + T.
+
+    **Arguments:** the bearing, the gap C_r, and delta_r [m], the elastic approach at the most loaded roller: delta_r +
+    G_r/2 is the shift of the shaft.
+    """
+    shift = elastic_approach + bearing.radial_clearance / 2
+    at_rest = guidance_gap / 2
+    return {"outer_rib": at_rest, "inner_rib": shift + at_rest, "roller": shift + bearing.pocket_clearance}
 
 
 @eqx.filter_jit
-def _distribution(bearing: Bearing, load: Array, centrifugal: Array, roller_angle: Array) -> LoadDistribution:
-    angles = roller_angles(bearing.n_rollers, roller_angle)
-    case = _LoadCase(bearing, load, centrifugal, -jnp.sin(angles))
-    excess = _solve_excess(case)
-    inner, outer = case.raceway_loads(excess)
-    shift = case.shift(excess)
+def _distribution(bearing: Bearing, load: Array, centrifugal: Array, first_angle: Array) -> LoadDistribution:
+    """The distribution, of which shift and half angle are NaN where the loads make no sense.
+
+    The unknown is the excess of the nearest roller: its approach beyond the `seat` into which its centrifugal force
+    presses it. The forces rise steadily but have kinks: the root is found by bisection and differentiated implicitly.
+    At zero excess no roller is loaded and at the bound that one alone carries the load, so that the root is enclosed.
+    """
+    angles = first_angle + 2 * jnp.pi / bearing.n_rollers * jnp.arange(bearing.n_rollers, dtype=float)
+    stiffness, cosines = bearing.raceway_stiffness, -jnp.sin(angles)
+    nearest = jnp.max(cosines)
+    approach = partial(line_contact_approach, stiffness)
+    seat = approach(centrifugal)
+    bound = 1.01 * (approach(load / nearest) + approach(load / nearest + centrifugal) - seat)
+    play = bearing.radial_clearance / 2 + seat
+
+    def loads(excess: Array) -> tuple[Array, Array]:
+        ratio = cosines / nearest  # delta_s cos(psi) - G_r/2 without cancellation at the nearest roller
+        return raceway_loads_of_all(seat + excess * ratio - play * (1 - ratio), stiffness, centrifugal)
+
+    def imbalance(fraction: Array, _: None) -> Array:
+        return jnp.sum(loads(fraction * bound)[0] * cosines) / load - 1
+
+    # Without `throw`, which would put a callback to Python into every program and keep it from being cached on disk.
+    solver, options = optx.Bisection(rtol=1e-12, atol=1e-11, flip=False), dict(lower=0.0, upper=1.0)
+    root = optx.root_find(imbalance, solver, jnp.asarray(0.5), None, options=options, max_steps=128, throw=False)
+    found = (root.result == optx.RESULTS.successful) & (load > 0) & (centrifugal >= 0)
+    excess = jnp.where(found, root.value * bound, jnp.nan)
+    inner, outer = loads(excess)
+    shift = (excess + play) / nearest
     return LoadDistribution(
         roller_angles=angles,
         inner_loads=inner,
         outer_loads=outer,
         max_load=jnp.max(inner),
         shaft_shift=shift,
-        elastic_approach=case.seat + excess,
-        half_angle=loaded_half_angle(bearing.radial_clearance + 2 * case.seat, shift),
+        elastic_approach=seat + excess,
+        half_angle=jnp.arccos(play / shift),
     )
 
 

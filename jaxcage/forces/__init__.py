@@ -5,17 +5,15 @@
 | `law`        | base classes of laws, the motion that they see, the clearance of the guide            |
 | `film`       | short-bearing oil film of the rib lands, three film models, (25)-(28)                 |
 | `contact`    | line contact of the lands, with restitution                                           |
-| `support`    | springs, cubic stiffness, damping and cross-coupling, (16), (20)                      |
+| `support`    | springs, cubic stiffness, damping and cross-coupling, (16), (20); rigid or elastic rib |
 | `impact`     | roller-bar impact oscillator (14); synchronous impacts (15) or roller by roller       |
 | `pulse`      | Fourier integrals of the force of one impact                                          |
 | `inertia`    | weight, and centrifugal force of the cage's mass centre                               |
-| `rib`        | rigid or elastic rib                                                                  |
 | `elementary` | regularised elementary functions                                                      |
 
 Frame: x to the right, y up, rotation positive counter-clockwise; forces act on the cage.
 """
 
-from .._arguments import check_layer
 from .._parameters import choice as choice, count as count, parameter as parameter
 from .contact import (
     ContactForce as ContactForce,
@@ -27,7 +25,6 @@ from .elementary import (
     cos_sin as cos_sin,
     inverse_root as inverse_root,
     power_10_9 as power_10_9,
-    root_9 as root_9,
     smooth_norm as smooth_norm,
     smooth_plus as smooth_plus,
 )
@@ -35,38 +32,27 @@ from .film import (
     FilmForce as FilmForce,
     FilmModel as FilmModel,
     RibFilm as RibFilm,
+    arc_centre as arc_centre,
     film_drive as film_drive,
-    film_pressure as film_pressure,
     film_resistance as film_resistance,
     film_scale as film_scale,
-    fixed_half_resistance as fixed_half_resistance,
-    full_resistance as full_resistance,
     half_circle_resistance as half_circle_resistance,
-    short_film_force as short_film_force,
-    supply_force as supply_force,
 )
 from .impact import (
-    ImpactHistory as ImpactHistory,
     PocketImpact as PocketImpact,
     RollerPassImpact as RollerPassImpact,
     SynchronousForce as SynchronousForce,
     SynchronousImpact as SynchronousImpact,
     approach_speed as approach_speed,
     impact_history as impact_history,
-    impact_time_scale as impact_time_scale,
     pulse_spectrum as pulse_spectrum,
     pulse_train as pulse_train,
-    pulse_train_force as pulse_train_force,
-    synchronous_amplitude as synchronous_amplitude,
-    synchronous_force as synchronous_force,
 )
 from .inertia import (
     UnbalanceForce as UnbalanceForce,
     UnbalanceReading as UnbalanceReading,
     WeightForce as WeightForce,
     effective_eccentricity as effective_eccentricity,
-    unbalance_force as unbalance_force,
-    weight as weight,
 )
 from .law import (
     AbstractForce as AbstractForce,
@@ -76,24 +62,8 @@ from .law import (
     Land as Land,
     Motion as Motion,
 )
-from .rib import ElasticRib as ElasticRib, RigidRib as RigidRib, rib_force as rib_force
-from .support import (
-    Support as Support,
-    cross_force as cross_force,
-    cubic_stiffness as cubic_stiffness,
-    spring_force as spring_force,
-)
+from .support import ElasticRib as ElasticRib, RigidRib as RigidRib, Support as Support
 
 
 LAWS: tuple[type[AbstractLaw], ...] = (RibFilm, LandContact, Support, SynchronousImpact, RollerPassImpact)
 """The laws that a cage and its configuration file know, in the order in which forces are listed and added."""
-
-
-check_layer(
-    globals(),
-    "approach_speed contact_force cross_force cubic_stiffness effective_eccentricity "
-    "film_drive film_pressure film_resistance film_scale fixed_half_resistance full_resistance half_circle_resistance "
-    "impact_history impact_time_scale inverse_root power_10_9 pulse_spectrum pulse_train pulse_train_force "
-    "restitution_damping rib_force root_9 short_film_force smooth_norm smooth_plus spring_force "
-    "supply_force synchronous_amplitude synchronous_force unbalance_force weight",
-)

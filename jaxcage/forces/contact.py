@@ -61,7 +61,6 @@ class LandContact(AbstractLaw):
         1e4,
         1e12,
         "line-contact stiffness of all lands together",
-        within=(2e8, 2e10),
         source="press the land on its rib: force over approach",
     )
     onset: Scalar = parameter(
@@ -69,7 +68,6 @@ class LandContact(AbstractLaw):
         0.5,
         0.999,
         "eccentricity ratio at which the contact begins",
-        within=(0.9, 0.99),
         source="roughness of land and rib over the clearance",
     )
     restitution: Scalar = parameter(
@@ -77,19 +75,14 @@ class LandContact(AbstractLaw):
         0.05,
         1.0,
         "coefficient of restitution at the approach speed",
-        within=(0.3, 1.0),
         source="drop the cage on its rib: height of the rebound",
         default=1.0,
     )
     approach_speed: Scalar = parameter(
-        "m/s", 1e-4, 10.0, "approach speed to which the restitution belongs", kind="fixed", default=0.1
+        "m/s", 1e-4, 10.0, "approach speed to which the restitution belongs", default=0.1
     )
     smoothing: Scalar = parameter(
-        "m",
-        1e-12,
-        1e-5,
-        "half width over which contact sets in and film coefficients saturate",
-        default=2e-7,
+        "m", 1e-12, 1e-5, "half width over which contact sets in and film coefficients saturate", default=2e-7
     )
 
     def at(self, cage: GuidedCage, speed: Scalar) -> "ContactForce":

@@ -8,7 +8,6 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from .._arguments import require_above_zero
 from .._pytrees import Scalar
 
 
@@ -42,7 +41,6 @@ def smooth_plus(u: Scalar, width: Scalar) -> Array:
 
     **Returns:** a value >= 0 in that unit; it exceeds max(u, 0) by at most 0.16 `width`, at u = 0.
     """
-    require_above_zero(width=width)
     t = jnp.clip((u + width) * (0.5 / width), 0.0, 1.0)
     return jnp.where(u >= width, u, 2 * width * t**4 * (t * (t - 3) + 2.5))
 
@@ -82,21 +80,15 @@ def _inverse_ninth_root_jvp(primals: tuple[Array], tangents: tuple[Array]) -> tu
     return root, root * _ninth_power(root) * (-1 / 9) * p_dot
 
 
-def root_9(p: Scalar) -> Array:
-    """p^(1/9) for p >= 0, with finite derivatives of every order at p = 0 (where they are taken as zero)."""
+def power_10_9(p: Scalar) -> Array:
+    """p^(10/9) for p >= 0, with finite derivatives of every order at p = 0; those of p^(1/9) are zero there."""
     p = jnp.asarray(p, dtype=float)
     touching = p > 0
     safe = jnp.where(touching, p, 1.0)
     root = _inverse_ninth_root(safe)
     root2 = root * root
     root4 = root2 * root2
-    return jnp.where(touching, safe * (root4 * root4), 0.0)
-
-
-def power_10_9(p: Scalar) -> Array:
-    """p^(10/9) for p >= 0, with finite derivatives as those of `root_9`."""
-    p = jnp.asarray(p, dtype=float)
-    return p * root_9(p)
+    return p * jnp.where(touching, safe * (root4 * root4), 0.0)
 
 
 def _polynomial(coefficients: tuple[float, ...], z: Scalar) -> Scalar:

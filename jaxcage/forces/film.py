@@ -21,10 +21,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from .._arguments import require_above_zero, require_at_least
 from .._parameters import choice, count, parameter
 from .._pytrees import Scalar
-from .elementary import inverse_root, smooth_norm
+from .elementary import inverse_root
 from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion
 
 
@@ -47,40 +46,7 @@ def film_scale(viscosity: Scalar, radius: Scalar, width: Scalar, clearance: Scal
 
     **Arguments:** dynamic viscosity [Pa s], land radius [m], width of one land [m], radial clearance [m].
     """
-    require_at_least(0, viscosity=viscosity)
-    require_above_zero(radius=radius, width=width)
     return jnp.asarray(viscosity * radius * width * (width / clearance) ** 2)
-
-
-def _arc_parts(half: bool, square: Scalar) -> tuple[Scalar, Scalar]:
-    """1/(1 - eps^2), and the isotropic part of M over half the circle or the whole one, at the square of eps."""
-    inverse = 1 / (1 - square)
-    return inverse, (jnp.pi / 2 if half else jnp.pi) * inverse * jnp.sqrt(inverse)
-
-
-def fixed_half_resistance(x: Scalar, y: Scalar, direction: Vector) -> Resistance:
-    """M over the half circle that trails the line of centres (alpha from 0 to pi), as in (27).
-
-    With r' = (-y, x) it is isotropic I + radial r r^T - skew (n r'^T + r' n^T).
-
-    **Arguments:** position over clearance, and its direction as a unit vector, regularised where the arc loses it (at
-    the centre).
-    """
-    nx, ny = direction
-    inverse, isotropic = _arc_parts(True, x * x + y * y)
-    radial, skew = 3 * isotropic * inverse, 2 * inverse * inverse
-    return Resistance(
-        isotropic + radial * x * x + 2 * skew * nx * y,
-        radial * x * y - skew * (nx * x - ny * y),
-        isotropic + radial * y * y - 2 * skew * nx * y,
-    )
-
-
-def full_resistance(x: Scalar, y: Scalar) -> Resistance:
-    """M over the whole circle: pressure of both signs (full Sommerfeld condition)."""
-    inverse, isotropic = _arc_parts(False, x * x + y * y)
-    radial = 3 * isotropic * inverse
-    return Resistance(isotropic + radial * x * x, radial * x * y, isotropic + radial * y * y)
 
 
 def half_circle_resistance(x: Scalar, y: Scalar, ux: Scalar, uy: Scalar) -> Resistance:
@@ -107,78 +73,45 @@ def half_circle_resistance(x: Scalar, y: Scalar, ux: Scalar, uy: Scalar) -> Resi
     )
 
 
-def film_drive(x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar) -> tuple[Array, Array]:
+def film_drive(x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar) -> Vector:
     """P = 2 v - omega (-y, x): squeeze and entrainment, in clearances per second."""
-    return jnp.asarray(2 * vx + omega * y), jnp.asarray(2 * vy - omega * x)
+    return 2 * vx + omega * y, 2 * vy - omega * x
 
 
-def film_resistance(
-    model: FilmModel,
-    x: Scalar,
-    y: Scalar,
-    direction: Vector,
-    px: Scalar,
-    py: Scalar,
-    omega: Scalar,
-    smoothing: Scalar,
-) -> Resistance:
-    """M of one of the three film models at position (x, y) over clearance, for the drive P = (px, py).
+def arc_centre(model: FilmModel, direction: Vector, drive: Vector, least: Scalar) -> Vector:
+    """Unit vector u to the middle of the half circle that carries pressure; (0, 0) for `full`, which has no such half.
 
-    `direction` is the unit vector of (x, y). `smoothing`, a small length over clearance, times `omega` regularises the
-    direction of P where P = 0.
+    **Arguments:** film model; direction of the position; drive P; a small drive that regularises the direction of P
+    where P = 0.
     """
-    if model == "fixed_half":
-        return fixed_half_resistance(x, y, direction)
     if model == "full":
-        return full_resistance(x, y)
-    per_norm = inverse_root(px * px + py * py + (smoothing * omega) ** 2 + 1e-300)  # 1e-300: no 0/0 at rest
-    return half_circle_resistance(x, y, px * per_norm, py * per_norm)
-
-
-def supply_force(
-    model: FilmModel, direction: Vector, px: Scalar, py: Scalar, omega: Scalar, smoothing: Scalar
-) -> tuple[Array, Array]:
-    """Thrust -2 u of a uniform gauge pressure on the pressurised half circle centred on u, in units of R L p_0.
-
-    The paper's last term of (27): +2 R L p_0 along +phi, since the fixed half is centred on -phi. Zero for `full`.
-    """
-    nx, ny = direction
-    if model == "full":
-        return jnp.zeros_like(jnp.asarray(nx)), jnp.zeros_like(jnp.asarray(nx))
+        return 0.0, 0.0
     if model == "fixed_half":
-        return jnp.asarray(-2 * ny), jnp.asarray(2 * nx)
-    factor = -2 * inverse_root(px * px + py * py + (smoothing * omega) ** 2 + 1e-300)
-    return factor * px, factor * py
+        return direction[1], -direction[0]
+    px, py = drive
+    per_norm = inverse_root(px * px + py * py + least**2 + 1e-300)  # 1e-300: no 0/0 at rest
+    return px * per_norm, py * per_norm
 
 
-def short_film_force(
-    model: FilmModel, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar, smoothing: Scalar = 1e-9
-) -> tuple[Array, Array]:
-    """Force of the film in units of S = mu R L^3 / c^2, times 1/s: -(1/2) M P.
+def film_resistance(model: FilmModel, x: Scalar, y: Scalar, direction: Vector, arc: Vector) -> Resistance:
+    """M of one of the three film models.
 
-    **Arguments:** `model`; position and velocity of the cage centre over clearance [-, 1/s]; cage speed [rad/s];
-    `smoothing`, a small length over clearance.
+    Over the whole circle it is isotropic I + radial r r^T. Over the half circle that trails the line of centres (alpha
+    from 0 to pi), as in (27), it is half of that and - skew (n r'^T + r' n^T) with r' = (-y, x).
 
-    **Returns:** (F_x, F_y) / S [1/s].
+    **Arguments:** film model; position (x, y) over clearance, and its direction n as a unit vector, regularised at the
+    centre, where the fixed arc loses it; the arc as from `arc_centre`.
     """
-    px, py = film_drive(x, y, vx, vy, omega)
-    per_eps = 1 / smooth_norm(x, y, smoothing)
-    m = film_resistance(model, x, y, (x * per_eps, y * per_eps), px, py, omega, smoothing)
-    return -(m.xx * px + m.xy * py) / 2, -(m.xy * px + m.yy * py) / 2
-
-
-def film_pressure(
-    alpha: Scalar, z: Scalar, eps: Scalar, eps_rate: Scalar, phi_rate: Scalar, omega: Scalar, factor: Scalar
-) -> Array:
-    """Short-bearing pressure (26) in clean form, at angle `alpha` from the widest gap and axial place `z` over width.
-
-    p = factor (1/4 - z^2) [(omega - 2 phi') eps sin(alpha) - 2 eps' cos(alpha)] / (1 + eps cos(alpha))^3, with
-    factor = 3 mu L^2 / c^2 [Pa s]. The paper prints 1 + eps cos^3(alpha) and drops mu and the squeeze term.
-
-    **Returns:** gauge pressure [Pa]; of both signs: the film models differ in what they keep of it.
-    """
-    drive = (omega - 2 * phi_rate) * eps * jnp.sin(alpha) - 2 * eps_rate * jnp.cos(alpha)
-    return factor * (0.25 - z * z) * drive / (1 + eps * jnp.cos(alpha)) ** 3
+    if model == "positive_pressure":
+        return half_circle_resistance(x, y, *arc)
+    inverse = 1 / (1 - (x * x + y * y))
+    isotropic = (jnp.pi if model == "full" else jnp.pi / 2) * inverse * jnp.sqrt(inverse)
+    radial = 3 * isotropic * inverse
+    xx, xy, yy = isotropic + radial * x * x, radial * x * y, isotropic + radial * y * y
+    if model == "full":
+        return Resistance(xx, xy, yy)
+    (nx, ny), skew = direction, 2 * inverse * inverse
+    return Resistance(xx + 2 * skew * nx * y, xy - skew * (nx * x - ny * y), yy - 2 * skew * nx * y)
 
 
 class RibFilm(AbstractLaw):
@@ -188,7 +121,7 @@ class RibFilm(AbstractLaw):
 
     land_width: Scalar = parameter("m", 1e-4, 0.05, "width of one guiding land", kind="drawing")
     smoothing: Scalar = parameter(
-        "m", 1e-12, 1e-5, "length that keeps the film differentiable at the centre", kind="fixed", default=1e-9
+        "m", 1e-12, 1e-5, "length that keeps the film differentiable at the centre", default=1e-9
     )
     supply_pressure: Scalar = parameter(
         "Pa", 0.0, 1e6, "gauge supply pressure p_0 of (27)", kind="operating", default=0.0
@@ -219,20 +152,24 @@ class FilmForce(AbstractForce):
     scale: Scalar
     """S = mu R L (L/c)^2 of all lands [N s]."""
     supply_scale: Scalar
-    """R L p_0 of all lands [N]."""
+    """R L p_0 of all lands [N]. The thrust of a uniform gauge pressure on the half circle centred on u is -2 R L p_0 u,
+    the paper's last term of (27): +2 R L p_0 along +phi, since the fixed half is centred on -phi."""
     drag: Scalar
     """2 pi mu R^3 L/c of all lands [N m s]: the torque per speed of a cage in the middle of its clearance."""
     model: FilmModel = eqx.field(static=True)
 
     def force(self, motion: Motion) -> Force:
-        place, blur = motion.place, motion.land.centre_width
-        x, y, omega = place.x, place.y, motion.cage_speed + motion.land_speed
-        px, py = film_drive(x, y, place.vx, place.vy, omega)
+        place, direction = motion.place, (motion.place.nx, motion.place.ny)
+        omega = motion.cage_speed + motion.land_speed
+        px, py = film_drive(place.x, place.y, place.vx, place.vy, omega)
+        ux, uy = arc_centre(self.model, direction, (px, py), motion.land.centre_width * omega)
         kept = 1 - place.excess * place.per_eps
-        m = film_resistance(self.model, kept * x, kept * y, (place.nx, place.ny), px, py, omega, blur)
-        half = -self.scale / 2
-        fx, fy = jnp.asarray(half * (m.xx * px + m.xy * py)), jnp.asarray(half * (m.xy * px + m.yy * py))
-        thrust = supply_force(self.model, (place.nx, place.ny), px, py, omega, blur)
+        m = film_resistance(self.model, kept * place.x, kept * place.y, direction, (ux, uy))
+        half, thrust = -self.scale / 2, -2 * self.supply_scale
         eps = place.eps - place.excess
         torque = self.drag * inverse_root(1 - eps * eps) * (motion.cage_speed - motion.land_speed)
-        return fx + self.supply_scale * thrust[0], fy + self.supply_scale * thrust[1], -torque
+        return (
+            half * (m.xx * px + m.xy * py) + thrust * ux,
+            half * (m.xy * px + m.yy * py) + thrust * uy,
+            -torque,
+        )

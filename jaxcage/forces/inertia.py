@@ -7,20 +7,12 @@ from typing import Literal
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from .._arguments import require_above_zero
 from .._pytrees import Scalar
 from .elementary import cos_sin
 from .law import AbstractForcing, Force, Motion
 
 
 UnbalanceReading = Literal["physical", "as_printed"]
-
-
-def unbalance_force(tau: Scalar, unbalance: Scalar, omega: Scalar) -> tuple[Scalar, Scalar]:
-    """M e omega^2 (cos tau, sin tau) [N], with M e [kg m] and speed [rad/s]."""
-    amplitude = unbalance * omega**2
-    cosine, sine = cos_sin(tau)
-    return amplitude * cosine, amplitude * sine
 
 
 def effective_eccentricity(
@@ -31,26 +23,21 @@ def effective_eccentricity(
     `as_printed` takes (20) literally: 2 M rho omega^2 with rho = e/C_r read as a number of `printed_unit` (one
     millimetre): 4.44 e at a gap of 0.45 mm, 3.33 e at 0.60 mm.
     """
-    require_above_zero(guidance_gap=guidance_gap)
     if reading == "physical":
         return jnp.asarray(eccentricity)
     return jnp.asarray(2 * eccentricity / guidance_gap * printed_unit)
 
 
 class UnbalanceForce(AbstractForcing):
-    """Centrifugal force of the mass centre."""
+    """Centrifugal force of the mass centre, M e omega^2 (cos tau, sin tau) [N]."""
 
     unbalance: Scalar
     """Mass times the eccentricity that enters the force, M e [kg m]."""
 
     def force(self, motion: Motion) -> Force:
-        return *unbalance_force(motion.phase, self.unbalance, motion.cage_speed), 0.0
-
-
-def weight(mass: Scalar, gravity: Scalar) -> tuple[Array, Array]:
-    """-M g along y [N], with mass [kg] and gravity [m/s^2]."""
-    force = jnp.asarray(mass * gravity)
-    return jnp.zeros_like(force), -force
+        amplitude = self.unbalance * motion.cage_speed**2
+        cosine, sine = cos_sin(motion.phase)
+        return amplitude * cosine, amplitude * sine, 0.0
 
 
 class WeightForce(AbstractForcing):

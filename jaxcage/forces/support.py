@@ -1,10 +1,10 @@
-"""Elastic support between cage and rib, paper eqs. (16) and (20): springs, a cubic term, damping, cross-coupling."""
+"""Elastic support between cage and rib, paper eqs. (16) and (20): springs, a cubic term, damping, cross-coupling; and
+the rib that guides the cage, rigid or a mass on its own elastic support.
+"""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import equinox as eqx
-import jax.numpy as jnp
-from jaxtyping import Array
 
 from .._parameters import choice, parameter
 from .._pytrees import Scalar
@@ -13,28 +13,9 @@ from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion
 
 Cross = Literal["circulatory", "as_printed"]
 Cubic = Literal["absolute", "dimensionless"]
-
-
-def spring_force(x: Scalar, y: Scalar, stiffness_x: Scalar, stiffness_y: Scalar, cubic: Scalar) -> tuple[Array, Array]:
-    """-(K + K_3 |r|^2) r [N]: our isotropic form of the paper's cubic stiffness, with K_x and K_y of its fig. 6."""
-    hardening = cubic * (x * x + y * y)
-    return jnp.asarray(-(stiffness_x + hardening) * x), jnp.asarray(-(stiffness_y + hardening) * y)
-
-
-def cross_force(cross: Cross, x: Scalar, y: Scalar, linear: Scalar, cubic: Scalar) -> tuple[Array, Array]:
-    """Cross-coupling force [N].
-
-    `circulatory`: K_xy (-y, x), which pumps energy into whirl. `as_printed` in (20): -K_xy (y, x) - K'_xy (y^3, x^3),
-    whose linear part is conservative.
-    """
-    if cross == "circulatory":
-        return jnp.asarray(-linear * y), jnp.asarray(linear * x)
-    return jnp.asarray(-(linear * y + cubic * y**3)), jnp.asarray(-(linear * x + cubic * x**3))
-
-
-def cubic_stiffness(reading: Cubic, absolute: Scalar, relative: Scalar, stiffness: Scalar, clearance: Scalar) -> Array:
-    """K_3 [N/m^3]: given as such, or as alpha K_s / c^2 with a dimensionless alpha, so that a larger gap softens it."""
-    return jnp.asarray(absolute if reading == "absolute" else relative * stiffness / clearance**2)
+_SPRING = "tap the cage on its rib: the frequency it answers with"
+_CUBIC = "push the cage on its rib: force over way, far out"
+_WHIRL = "whirl frequency and its growth, from two probes at the cage"
 
 
 class Support(AbstractLaw):
@@ -42,79 +23,40 @@ class Support(AbstractLaw):
 
     law_name = "support"
 
-    stiffness_x: Scalar = parameter(
-        "N/m",
-        0.0,
-        1e9,
-        "support stiffness K_x",
-        within=(1e4, 1e6),
-        source="tap the cage on its rib: the frequency it answers with",
-    )
-    stiffness_y: Scalar = parameter(
-        "N/m",
-        0.0,
-        1e9,
-        "support stiffness K_y",
-        within=(1e4, 1e6),
-        source="tap the cage on its rib: the frequency it answers with",
-    )
+    stiffness_x: Scalar = parameter("N/m", 0.0, 1e9, "support stiffness K_x", source=_SPRING)
+    stiffness_y: Scalar = parameter("N/m", 0.0, 1e9, "support stiffness K_y", source=_SPRING)
     damping: Scalar = parameter(
-        "N s/m",
-        0.0,
-        1e5,
-        "support damping B_s",
-        within=(0.3, 30.0),
-        source="tap the cage on its rib: how fast the answer decays",
+        "N s/m", 0.0, 1e5, "support damping B_s", source="tap the cage on its rib: how fast the answer decays"
     )
     cubic_stiffness: Scalar = parameter(
-        "N/m^3",
-        0.0,
-        1e18,
-        "cubic stiffness K_3, for cubic = absolute",
-        within=(1e11, 1e14),
-        source="push the cage on its rib: force over way, far out",
-        default=0.0,
+        "N/m^3", 0.0, 1e18, "cubic stiffness K_3, for cubic = absolute", source=_CUBIC, default=0.0
     )
     cubic_ratio: Scalar = parameter(
-        "1",
-        0.0,
-        1e4,
-        "alpha in K_3 = alpha K_s / c^2, for cubic = dimensionless",
-        within=(0.1, 100.0),
-        source="push the cage on its rib: force over way, far out",
-        default=0.0,
+        "1", 0.0, 1e4, "alpha in K_3 = alpha K_s / c^2, for cubic = dimensionless", source=_CUBIC, default=0.0
     )
-    cross_stiffness: Scalar = parameter(
-        "N/m",
-        -1e8,
-        1e8,
-        "cross-coupling stiffness K_xy",
-        within=(-5e3, 5e3),
-        source="whirl frequency and its growth, from two probes at the cage",
-        default=0.0,
-    )
+    cross_stiffness: Scalar = parameter("N/m", -1e8, 1e8, "cross-coupling stiffness K_xy", source=_WHIRL, default=0.0)
     cross_cubic: Scalar = parameter(
-        "N/m^3",
-        -1e18,
-        1e18,
-        "cubic cross-coupling K'_xy, for cross = as_printed",
-        within=(-1e13, 1e13),
-        source="whirl frequency and its growth, from two probes at the cage",
-        default=0.0,
+        "N/m^3", -1e18, 1e18, "cubic cross-coupling K'_xy, for cross = as_printed", source=_WHIRL, default=0.0
     )
     cross: Cross = choice("circulatory", "as_printed", text="form of the cross-coupling", default="circulatory")
     cubic: Cubic = choice("absolute", "dimensionless", text="how the cubic stiffness is given", default="absolute")
 
     def at(self, cage: GuidedCage, speed: Scalar) -> "SupportForce":
-        """The support of `cage`."""
-        stiffness = (self.stiffness_x + self.stiffness_y) / 2
-        cubic = cubic_stiffness(self.cubic, self.cubic_stiffness, self.cubic_ratio, stiffness, cage.clearance)
+        """The support of `cage`; a cubic term that is dimensionless becomes softer with a larger clearance."""
+        cubic = self.cubic_stiffness
+        if self.cubic == "dimensionless":
+            cubic = self.cubic_ratio * ((self.stiffness_x + self.stiffness_y) / 2) / cage.clearance**2
         springs = (self.stiffness_x, self.stiffness_y, cubic, self.cross_stiffness, self.cross_cubic)
         return SupportForce(*springs, self.damping, self.cross)
 
 
 class SupportForce(AbstractForce):
-    """Springs, cross-coupling and damping."""
+    """Springs, cross-coupling and damping.
+
+    -(K + K_3 |r|^2) r, our isotropic form of the paper's cubic stiffness with K_x and K_y of its fig. 6. Cross-coupling
+    is `circulatory`, K_xy (-y, x), which pumps energy into whirl; or `as_printed` in (20), -K_xy (y, x) - K'_xy (y^3,
+    x^3), whose linear part is conservative.
+    """
 
     stiffness_x: Scalar
     stiffness_y: Scalar
@@ -126,7 +68,44 @@ class SupportForce(AbstractForce):
     cross: Cross = eqx.field(static=True)
 
     def force(self, motion: Motion) -> Force:
-        x, y, b = motion.x, motion.y, self.damping
-        spring = spring_force(x, y, self.stiffness_x, self.stiffness_y, self.cubic)
-        cross = cross_force(self.cross, x, y, self.cross_stiffness, self.cross_cubic)
-        return spring[0] + cross[0] - b * motion.vx, spring[1] + cross[1] - b * motion.vy, 0.0
+        x, y, across = motion.x, motion.y, self.cross_stiffness
+        hardening = self.cubic * (x * x + y * y)
+        spring_x, spring_y = -(self.stiffness_x + hardening) * x, -(self.stiffness_y + hardening) * y
+        if self.cross == "circulatory":
+            cross_x, cross_y = -across * y, across * x
+        else:
+            cross_x, cross_y = -(across * y + self.cross_cubic * y**3), -(across * x + self.cross_cubic * x**3)
+        return spring_x + cross_x - self.damping * motion.vx, spring_y + cross_y - self.damping * motion.vy, 0.0
+
+
+class RigidRib(eqx.Module):
+    """A rib that does not move: the cage has two coordinates."""
+
+    kind: ClassVar[str] = "rigid"
+
+
+class ElasticRib(eqx.Module):
+    """A rib of finite mass on a nonlinear spring and a damper: cage and rib have four coordinates together."""
+
+    kind: ClassVar[str] = "elastic"
+
+    mass: Scalar = parameter("kg", 1e-3, 100.0, "rib mass M_O", kind="drawing")
+    stiffness: Scalar = parameter(
+        "N/m", 1.0, 1e12, "rib stiffness K_O", source="tap the outer ring in its seat: the frequency it answers with"
+    )
+    damping: Scalar = parameter(
+        "N s/m", 0.0, 1e8, "rib damping B_O", source="tap the outer ring in its seat: how fast the answer decays"
+    )
+    cubic_stiffness: Scalar = parameter(
+        "N/m^3",
+        0.0,
+        1e24,
+        "cubic rib stiffness K_O3",
+        source="push the outer ring in its seat: force over way",
+        default=0.0,
+    )
+
+    def holding_force(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> tuple[Scalar, Scalar]:
+        """-(K_O + K_O3 |r|^2) r - B_O r' [N]: the force that holds the rib in place."""
+        hardening = self.stiffness + self.cubic_stiffness * (x * x + y * y)
+        return -hardening * x - self.damping * vx, -hardening * y - self.damping * vy

@@ -20,11 +20,8 @@ from .._arguments import check_layer
 from .bearing_field import MOVING as MOVING, BearingAtSpeed as BearingAtSpeed, Passed as Passed
 from .bearing_history import RollerHistory as RollerHistory
 from .bearing_model import (
-    CAGE_STARTS as CAGE_STARTS,
     WHOLE_BEARINGS as WHOLE_BEARINGS,
     BearingModel as BearingModel,
-    CagePlace as CagePlace,
-    InnerRing as InnerRing,
     Wear as Wear,
     drawn_places as drawn_places,
     rolling_start as rolling_start,
@@ -47,34 +44,31 @@ from .bearing_states import (
     rollers_of as rollers_of,
 )
 from .cage import (
-    FASTEST as FASTEST,
     FORCES as FORCES,
     NEEDED as NEEDED,
-    CageAtSpeed as CageAtSpeed,
     CageModel as CageModel,
     fastest_speed as fastest_speed,
 )
 from .cage_quantities import CAGE_QUANTITIES as CAGE_QUANTITIES, CageHistory as CageHistory
-from .cases import CONSTANTS as CONSTANTS, Constants as Constants, case as case
+from .cases import CONSTANTS as CONSTANTS, case as case
 from .contacts import (
     Pockets as Pockets,
     Raceways as Raceways,
-    RollerDrag as RollerDrag,
     Traction as Traction,
     bar_stiffness as bar_stiffness,
 )
 from .field import (
     AbstractField as AbstractField,
-    AbstractLinearisation as AbstractLinearisation,
     FirstOrderField as FirstOrderField,
+    Linearisation as Linearisation,
     ScaledField as ScaledField,
-    SecondOrderField as SecondOrderField,
     divide as divide,
     multiply as multiply,
 )
 from .oscillator import ForcedOscillator as ForcedOscillator, ForcedSystem as ForcedSystem
 from .protocol import (
     ESCAPE as ESCAPE,
+    FASTEST as FASTEST,
     INSTEAD as INSTEAD,
     AbstractForcedSystem as AbstractForcedSystem,
     require_known as require_known,

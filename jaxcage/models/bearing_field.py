@@ -9,9 +9,8 @@ too) and the moment tau_C of the contacts about C:
     M C'' = F_C + M e (omega^2 n - omega' t),   J_G omega' = tau_C - e M g cos theta - e t.F_C.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -23,18 +22,14 @@ from .bearing_states import LOST, BearingState, Bodies, Rates, Rollers, bodies_o
 from .contacts import (
     Guide,
     LandForces,
-    PocketConstants,
     PocketForces,
     RacewayConstants,
     RacewayForces,
-    inner_contact,
     land_forces,
-    magnitude,
-    outer_contact,
     pocket_contact,
-    quadratic,
+    raceway_contact,
 )
-from .field import AbstractField, AbstractLinearisation
+from .field import AbstractField
 
 
 Many = Float[Array, "*rollers"] | float | int
@@ -110,29 +105,24 @@ MOVING = 7
 class BearingAtSpeed(AbstractField):
     """The laws of the bearing at one shaft speed, with all constants computed."""
 
-    n_rollers: int = eqx.field(static=True)
-    held: bool = eqx.field(static=True)
-    inner_guided: bool = eqx.field(static=True)
+    model: Any
+    """The `BearingModel`."""
     speed: Scalar
     """Speed of the inner ring [rad/s]."""
-    outer_speed: Scalar
     outer_race: RacewayConstants
     inner_race: RacewayConstants
-    pocket: PocketConstants
     guide: Guide
     roller_mass: Scalar
     roller_inertia: Scalar
     drag: Scalar
     churning: Scalar
-    cage_mass: Scalar
-    cage_inertia: Scalar
-    eccentricity: Scalar
-    ring_mass: Scalar
-    mounting_damping: Scalar
-    gravity: Scalar
-    load: Scalar
     rolling_cage_speed: Scalar
     rolling_spin: Scalar
+
+    @property
+    def n_rollers(self) -> int:
+        """Number of rollers."""
+        return self.model.bearing.n_rollers
 
     def __call__(self, tau: Scalar, y: State) -> State:
         """Rates of a row of the state at the cage's angle `tau`."""
@@ -140,9 +130,6 @@ class BearingAtSpeed(AbstractField):
         row = jnp.stack([jnp.asarray(c, dtype=float) for c in y])
         rates = self.rates(BearingState(rollers_of(row), bodies_of(row), clock)).state
         return tuple(self.pace(rates.clock[0]) * rates.row)
-
-    def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
-        raise NotImplementedError("A whole bearing has no linearisation: its methods are explicit.")
 
     def pace(self, cage_speed: Scalar) -> Scalar:
         """Factor from rates over time to rates over the cage's angle, counted in its sense."""
@@ -171,21 +158,22 @@ class BearingAtSpeed(AbstractField):
 
     def on_roller(self, rollers: Rollers, cage: Bodies, pocket_cos: Scalar, pocket_sin: Scalar) -> Forces:
         """Every contact of one roller, of whom alone `rollers` are, by elementary operations."""
-        g = self._geometry(rollers, cage, pocket_cos, pocket_sin)
+        g = self.geometry(rollers, cage, pocket_cos, pocket_sin)
         across = rollers.radius * rollers.orbit
         ring_out = cage.ring_vx * g.cos + cage.ring_vy * g.sin
         ring_across = cage.ring_vy * g.cos - cage.ring_vx * g.sin
         dv_out, dv_across = rollers.radial - ring_out, across - ring_across
-        inner = inner_contact(
+        inner = raceway_contact(
             self.inner_race,
+            False,
             g.distance,
             g.inner_out * dv_out + g.inner_across * dv_across,
             g.inner_out * dv_across - g.inner_across * dv_out,
             rollers.spin,
         )
-        outer = outer_contact(self.outer_race, rollers.radius, rollers.radial, rollers.orbit, rollers.spin)
+        outer = raceway_contact(self.outer_race, True, rollers.radius, rollers.radial, across, rollers.spin)
         pocket = pocket_contact(
-            self.pocket,
+            self.model,
             rollers.radius * g.lag_cos - (cage.x * g.pocket_cos + cage.y * g.pocket_sin),
             rollers.radius * g.lag_sin - (cage.y * g.pocket_cos - cage.x * g.pocket_sin),
             rollers.radial * g.lag_cos - across * g.lag_sin - (cage.vx * g.pocket_cos + cage.vy * g.pocket_sin),
@@ -193,25 +181,21 @@ class BearingAtSpeed(AbstractField):
             rollers.spin,
             cage.cage_speed,
         )
-        fast = magnitude(rollers.radial, across)
-        drag_out, drag_across = quadratic(rollers.radial, fast, self.drag), quadratic(across, fast, self.drag)
-        churning = quadratic(rollers.spin, jnp.abs(rollers.spin), self.churning)
+        drag = -self.drag * jnp.sqrt(rollers.radial * rollers.radial + across * across + 1e-24)  # smooth at rest
+        drag_out, drag_across = drag * rollers.radial, drag * across
+        churning = -self.churning * jnp.abs(rollers.spin) * rollers.spin
         power = -(drag_out * rollers.radial + drag_across * across + churning * rollers.spin)
         return Forces(g, outer, inner, pocket, drag_out, drag_across, churning, power)
 
     def on_land(self, cage: Bodies) -> LandForces:
         """The guiding land."""
-        if self.inner_guided:
+        if self.model.guidance == "inner":
             from_land = cage.x - cage.ring_x, cage.y - cage.ring_y, cage.vx - cage.ring_vx, cage.vy - cage.ring_vy
             return land_forces(self.guide, *from_land, cage.cage_speed, self.speed)
-        return land_forces(self.guide, cage.x, cage.y, cage.vx, cage.vy, cage.cage_speed, self.outer_speed)
+        return land_forces(self.guide, cage.x, cage.y, cage.vx, cage.vy, cage.cage_speed, self.model.outer_speed)
 
-    def geometry(self, state: BearingState) -> Geometry:
-        """Places of all rollers."""
-        each = jax.vmap(self._geometry, in_axes=(0, None, 0, 0))
-        return each(Rollers(*state.rollers), Bodies(*state.bodies), *self.pockets(state.clock[0]))
-
-    def _geometry(self, rollers: Rollers, cage: Bodies, pocket_cos: Scalar, pocket_sin: Scalar) -> Geometry:
+    def geometry(self, rollers: Rollers, cage: Bodies, pocket_cos: Scalar, pocket_sin: Scalar) -> Geometry:
+        """Place of a roller."""
         lag_cos, lag_sin = cos_sin(rollers.lag)
         c, s = pocket_cos * lag_cos - pocket_sin * lag_sin, pocket_sin * lag_cos + pocket_cos * lag_sin
         out = rollers.radius - (cage.ring_x * c + cage.ring_y * s)
@@ -246,8 +230,8 @@ class BearingAtSpeed(AbstractField):
         inner_across = inner.load * g.inner_across + inner.traction * g.inner_out
         out = inner_out - outer.load + pocket.out * g.lag_cos + pocket.along * g.lag_sin + f.drag_out
         across = inner_across + outer.traction + pocket.along * g.lag_cos - pocket.out * g.lag_sin + f.drag_across
-        out = out - self.roller_mass * self.gravity * g.sin
-        across = across - self.roller_mass * self.gravity * g.cos
+        out = out - self.roller_mass * self.model.gravity * g.sin
+        across = across - self.roller_mass * self.model.gravity * g.cos
         moment = outer.arm * outer.traction - inner.arm * inner.traction + pocket.roller_moment + f.churning
         per_mass = 1 / self.roller_mass
         rates = (
@@ -283,29 +267,29 @@ class BearingAtSpeed(AbstractField):
 
         **Arguments:** cosine and sine of the cage's angle; else as they are called.
         """
-        mass, e, g = self.cage_mass, self.eccentricity, self.gravity
+        model, inner_guided = self.model, self.model.guidance == "inner"
+        mass, e, g, damping = model.cage_mass, model.eccentricity, model.gravity, model.ring.mounting_damping
         cos, sin = phase
         contact_x, contact_y = land.x - sums.x, land.y - sums.y
         moment = sums.cage_moment + land.moment
         down = contact_y - mass * g
         drive = moment - e * mass * g * cos - e * (cos * down - sin * contact_x)
-        if self.held:
+        if model.cage_rotation == "held":
             turning, hold = jnp.zeros_like(drive), -drive
         else:
-            turning, hold = drive / self.cage_inertia, jnp.zeros_like(drive)
+            turning, hold = drive / model.cage_inertia, jnp.zeros_like(drive)
         swing = e * cage.cage_speed * cage.cage_speed
         cage_x = contact_x / mass + swing * cos + e * turning * sin
         cage_y = down / mass + swing * sin - e * turning * cos
 
-        from_land = self.inner_guided
-        ring_x = -sums.inner_x - self.mounting_damping * cage.ring_vx - (land.x if from_land else 0.0)
-        ring_y = -sums.inner_y - self.mounting_damping * cage.ring_vy - (land.y if from_land else 0.0)
-        ring_y = ring_y - self.load - self.ring_mass * g
-        ring_rates = cage.ring_vx, cage.ring_vy, ring_x / self.ring_mass, ring_y / self.ring_mass
-        on_inner = -sums.inner_moment + (land.land_moment if from_land else 0.0)
-        on_outer = -sums.outer_moment + (0.0 if from_land else land.land_moment)
-        mounting = self.mounting_damping * (cage.ring_vx * cage.ring_vx + cage.ring_vy * cage.ring_vy)
-        paid = -on_inner * self.speed - on_outer * self.outer_speed + hold * cage.cage_speed
+        ring_x = -sums.inner_x - damping * cage.ring_vx - (land.x if inner_guided else 0.0)
+        ring_y = -sums.inner_y - damping * cage.ring_vy - (land.y if inner_guided else 0.0)
+        ring_y = ring_y - model.load - model.ring.ring_mass * g
+        ring_rates = cage.ring_vx, cage.ring_vy, ring_x / model.ring.ring_mass, ring_y / model.ring.ring_mass
+        on_inner = -sums.inner_moment + (land.land_moment if inner_guided else 0.0)
+        on_outer = -sums.outer_moment + (0.0 if inner_guided else land.land_moment)
+        mounting = damping * (cage.ring_vx * cage.ring_vx + cage.ring_vy * cage.ring_vy)
+        paid = -on_inner * self.speed - on_outer * model.outer_speed + hold * cage.cage_speed
         about_origin = moment + cage.x * contact_y - cage.y * contact_x - mass * g * (cage.x + e * cos) + hold
         integrals = (
             paid,

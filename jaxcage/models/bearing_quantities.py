@@ -5,19 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..quantities import Averages, Quantity
-
-
-LOSSES = {
-    "traction": "traction on the raceways",
-    "raceway_damping": "damping of the raceway contacts",
-    "pocket_friction": "friction in the pockets",
-    "pocket_damping": "damping of the pocket contacts",
-    "film": "shearing and squeezing the film of the guiding land",
-    "land_contact": "contact of cage and land",
-    "drag": "drag and churning of the rollers",
-    "mounting": "damping of the inner ring's mounting",
-}
-"""Kinds of power that is lost, by the names of their integrals."""
+from .bearing_states import LOSSES
 
 
 def _lost(a: Averages) -> np.ndarray:

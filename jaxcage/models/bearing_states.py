@@ -78,19 +78,20 @@ def bodies_of(row: Any) -> Any:
     return row[..., -OF_BODIES:]
 
 
-LEDGER = (
-    "input",
-    "traction",
-    "raceway_damping",
-    "pocket_friction",
-    "pocket_damping",
-    "film",
-    "land_contact",
-    "drag",
-    "mounting",
-)
-"""Powers that are integrated [W]: input by the shaft (and by whoever turns the outer ring or holds the cage), and the
-losses of each kind of contact."""
+LOSSES = {
+    "traction": "traction on the raceways",
+    "raceway_damping": "damping of the raceway contacts",
+    "pocket_friction": "friction in the pockets",
+    "pocket_damping": "damping of the pocket contacts",
+    "film": "shearing and squeezing the film of the guiding land",
+    "land_contact": "contact of cage and land",
+    "drag": "drag and churning of the rollers",
+    "mounting": "damping of the inner ring's mounting",
+}
+"""Kinds of power that is lost, by the names of their integrals."""
+LEDGER = ("input", *LOSSES)
+"""Powers that are integrated [W]: that of the shaft (and of whoever turns the outer ring or holds the cage), losses.
+"""
 MEANS = (
     "cage_moment",
     "pocket_force",

@@ -2,7 +2,6 @@
 M r_C'' = F_film + F_contact + F_support + F_impact + M e omega^2 (cos tau, sin tau) - M g y.
 """
 
-import math
 from typing import Any, Literal
 
 import equinox as eqx
@@ -13,7 +12,7 @@ from jaxtyping import Array
 
 from .._arguments import is_concrete
 from .._errors import ArgumentError
-from .._parameters import parameter, printed, reading, require_readings, with_numbers
+from .._parameters import parameter, reading, require_readings, with_numbers
 from .._pytrees import Scalar, State
 from ..bearing import Bearing, Lubricant
 from ..forces import (
@@ -30,13 +29,11 @@ from ..forces import (
     UnbalanceReading,
     WeightForce,
     effective_eccentricity,
-    rib_force,
     smooth_norm,
-    weight,
 )
 from ..quantities import component_names
 from .field import AbstractField, SecondOrderField
-from .protocol import AbstractForcedSystem, told
+from .protocol import FASTEST, AbstractForcedSystem, told
 
 
 ClearanceReading = Literal["as_printed", "radial"]
@@ -51,9 +48,6 @@ ONSET_WIDTH = 4.0
 """Distance from the onset of land contact, in smoothing lengths, within which steps are not shortened any more."""
 SMOOTHEST = 0.1
 """Largest smoothing length over clearance: a larger one is no detail of the contact or of the film's centre."""
-FASTEST = 300.0
-"""Surface speed of the cage at its land [m/s] beyond which no cage runs: rho v^2 alone is 765 MPa of hoop stress in
-brass, twice what it bears, and what is given in rpm for rad/s is 9.5 times as fast as meant."""
 
 
 def _in_order(laws: Any) -> Any:
@@ -100,20 +94,18 @@ class CageAtSpeed(eqx.Module):
         """The law of a force, with its constants."""
         return self.laws[self.names.index(name)]
 
-    def motion(self, tau: Scalar, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> Motion:
-        """Motion of a cage with its centre at (x, y) [m] from the rib centre, moving at (vx, vy) [m/s]."""
-        return Motion(tau, x, y, vx, vy, self.speed, 0.0, self.shaft_speed, self.land)
-
     def forces(self, tau: Scalar, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> dict[str, Force]:
-        """Every force on the cage by name, as (F_x, F_y, moment) [N, N, N m]."""
-        motion = self.motion(tau, x, y, vx, vy)
+        """Every force on a cage by name, as (F_x, F_y, moment) [N, N, N m].
+
+        **Arguments:** phase; place of the cage's centre from the rib's [m] and its velocity [m/s].
+        """
+        motion = Motion(tau, x, y, vx, vy, self.speed, 0.0, self.shaft_speed, self.land)
         return {name: _force(name, law, motion) for name, law in zip(self.names, self.laws, strict=True)}
 
-    @property
-    def on_land(self) -> tuple[str, ...]:
-        """Names of the forces between land and cage, which react on an elastic rib."""
-        pairs = zip(self.names, self.laws, strict=True)
-        return tuple(name for name, law in pairs if not isinstance(law, AbstractForcing))
+    def __call__(self, tau: Scalar, q: State, v: State) -> State:
+        """Acceleration of a cage in a rib that does not move."""
+        f, per_mass = self.forces(tau, *q, *v).values(), 1 / self.mass
+        return per_mass * sum(p[0] for p in f), per_mass * sum(p[1] for p in f)
 
 
 def _force(name: str, law: AbstractForce, motion: Motion) -> Force:
@@ -123,17 +115,6 @@ def _force(name: str, law: AbstractForce, motion: Motion) -> Force:
     if not isinstance(force, tuple) or [jnp.shape(part) for part in force] != [(), (), ()]:
         raise ValueError(f"Force `{name}` must return (F_x, F_y, moment), three numbers, but returned {force}.")
     return force
-
-
-class RigidRibLaw(eqx.Module):
-    """Acceleration of a cage in a rib that does not move."""
-
-    cage: CageAtSpeed
-
-    def __call__(self, tau: Scalar, q: State, v: State) -> State:
-        f = self.cage.forces(tau, *q, *v).values()
-        per_mass = 1 / self.cage.mass
-        return per_mass * sum(p[0] for p in f), per_mass * sum(p[1] for p in f)
 
 
 class ElasticRibLaw(eqx.Module):
@@ -146,12 +127,12 @@ class ElasticRibLaw(eqx.Module):
     def __call__(self, tau: Scalar, q: State, v: State) -> State:
         (xc, yc, xo, yo), (uc, wc, uo, wo) = q, v
         f = self.cage.forces(tau, xc - xo, yc - yo, uc - uo, wc - wo)
-        rib = self.rib
-        held = rib_force(xo, yo, uo, wo, rib.stiffness, rib.damping, rib.cubic_stiffness)
-        down = weight(rib.mass, self.gravity)
+        held_x, held_y = self.rib.holding_force(xo, yo, uo, wo)
+        laws = zip(f.values(), self.cage.laws, strict=True)
+        mass, react = self.rib.mass, [force for force, law in laws if not isinstance(law, AbstractForcing)]
+        on_rib = held_x - sum(p[0] for p in react), held_y - mass * self.gravity - sum(p[1] for p in react)
         on_cage = [sum(p[i] for p in f.values()) for i in (0, 1)]
-        on_rib = [held[i] + down[i] - sum(f[name][i] for name in self.cage.on_land) for i in (0, 1)]
-        return (*(c / self.cage.mass for c in on_cage), *(c / rib.mass for c in on_rib))
+        return (*(c / self.cage.mass for c in on_cage), *(c / mass for c in on_rib))
 
 
 class CageModel(AbstractForcedSystem):
@@ -172,11 +153,9 @@ class CageModel(AbstractForcedSystem):
         "m", 0.0, 1e-3, "distance e of the cage's mass centre from its centre", kind="drawing"
     )
     rib: RigidRib | ElasticRib = eqx.field(default_factory=RigidRib)
-    gravity: Scalar = parameter("m/s^2", 0.0, 100.0, "acceleration of gravity", kind="fixed", default=9.81)
+    gravity: Scalar = parameter("m/s^2", 0.0, 100.0, "acceleration of gravity", default=9.81)
     load: Scalar = parameter("N", 0.0, 1e7, "shaft load F", kind="operating", default=4450.0)
-    printed_unit: Scalar = parameter(
-        "m", 1e-6, 1.0, "unit in which unbalance = as_printed reads rho", kind="fixed", default=1e-3
-    )
+    printed_unit: Scalar = parameter("m", 1e-6, 1.0, "unit in which unbalance = as_printed reads rho", default=1e-3)
     clearance_reading: ClearanceReading = reading(
         "radial clearance c of film, contact and land",
         radial="c = C_r/2, as C_r is defined",
@@ -217,15 +196,6 @@ class CageModel(AbstractForcedSystem):
         return tuple(law for law in self.forces if not law.law_name)
 
     @property
-    def force_names(self) -> tuple[str, ...]:
-        """Names of all forces on the cage, in the order in which they are added."""
-        named = [law.law_name for law in self.forces if law.law_name]
-        return (*named, "unbalance", "weight", *(type(law).__name__ for law in self.extra))
-
-    def __str__(self) -> str:
-        return printed(self)
-
-    @property
     def dimension(self) -> int:
         return 4 if isinstance(self.rib, RigidRib) else 8
 
@@ -239,22 +209,15 @@ class CageModel(AbstractForcedSystem):
         return "shaft speed", self.bearing.shaft_speed(speed)
 
     def centre(self, y: State) -> tuple[Scalar, Scalar]:
-        x, dy = (y[0], y[1]) if isinstance(self.rib, RigidRib) else (y[0] - y[2], y[1] - y[3])
+        x, dy = self._offset(y)
         return x / self.clearance, dy / self.clearance
 
-    def check_speeds(self, speeds: np.ndarray, name: str) -> None:
-        if not is_concrete(self.land_radius):
-            return
-        highest, limit = float(np.max(speeds, initial=0.0)), fastest_speed(self)
-        if highest > limit:
-            raise ArgumentError(
-                name,
-                said=(
-                    f"must be in rad/s, at most {limit:.0f} ({FASTEST:g} m/s at the land of this cage), but "
-                    f"{highest:g} was given, which is {highest * 30 / math.pi:.0f} rpm: `jaxcage.rpm({highest:g})` "
-                    "makes rad/s of rpm."
-                ),
-            )
+    def _offset(self, y: State) -> tuple[Scalar, Scalar]:
+        """Cage centre from that of the rib [m]."""
+        return (y[0], y[1]) if isinstance(self.rib, RigidRib) else (y[0] - y[2], y[1] - y[3])
+
+    def land_speed(self, speed: Scalar) -> Scalar:
+        return speed * self.land_radius
 
     @property
     def clearance(self) -> Array:
@@ -272,18 +235,20 @@ class CageModel(AbstractForcedSystem):
 
     def cage_at(self, speed: Scalar) -> CageAtSpeed:
         """The cage's force laws at `speed` [rad/s]."""
-        mass = self.cage_mass
+        named, extra, c = [law for law in self.forces if law.law_name], self.extra, self.clearance
         arm = effective_eccentricity(self.unbalance, self.eccentricity, self.guidance_gap, self.printed_unit)
-        own = (UnbalanceForce(mass * arm), WeightForce(mass * self.gravity))
-        known = [law.at(self, speed) for law in self.forces if law.law_name]
-        laws = (*known, *own, *(law.at(self, speed) for law in self.extra))
-        c, contact = self.clearance, self.contact
-        land = Land(c, 1 / c, contact.onset, contact.smoothing / c, self.film.smoothing / c)
-        return CageAtSpeed(laws, self.force_names, land, mass, speed, self.bearing.shaft_speed(speed))
+        own = {
+            "unbalance": UnbalanceForce(self.cage_mass * arm),
+            "weight": WeightForce(self.cage_mass * self.gravity),
+        }
+        laws = (*(law.at(self, speed) for law in named), *own.values(), *(law.at(self, speed) for law in extra))
+        names = (*(law.law_name for law in named), *own, *(type(law).__name__ for law in extra))
+        land = Land(c, 1 / c, self.contact.onset, self.contact.smoothing / c, self.film.smoothing / c)
+        return CageAtSpeed(laws, names, land, self.cage_mass, speed, self.bearing.shaft_speed(speed))
 
     def at_speed(self, speed: Scalar) -> AbstractField:
         cage = self.cage_at(speed)
-        law = RigidRibLaw(cage) if isinstance(self.rib, RigidRib) else ElasticRibLaw(cage, self.rib, self.gravity)
+        law = cage if isinstance(self.rib, RigidRib) else ElasticRibLaw(cage, self.rib, self.gravity)
         return SecondOrderField(law, speed)
 
     def scale(self, speed: Scalar) -> State:
@@ -302,8 +267,7 @@ class CageModel(AbstractForcedSystem):
 
     def excursion(self, y: State) -> Scalar:
         """Eccentricity ratio eps of the cage centre in its clearance circle; 1 where the surfaces would overlap."""
-        x, dy = (y[0], y[1]) if isinstance(self.rib, RigidRib) else (y[0] - y[2], y[1] - y[3])
-        return smooth_norm(x, dy, self.film.smoothing) / self.clearance
+        return smooth_norm(*self._offset(y), self.film.smoothing) / self.clearance
 
     def abrupt(self, y: State, rate: State) -> tuple[Scalar, Scalar]:
         """The onset of land contact, whose force sets in within a smoothing length.

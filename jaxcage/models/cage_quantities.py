@@ -95,11 +95,7 @@ def winding(
 
 CAGE_QUANTITIES = (
     Quantity(
-        "whirl_ratio",
-        "",
-        "1",
-        "whirl speed about the mean centre / cage speed",
-        of=lambda h: h.whirl_ratio(h.centre),
+        "whirl_ratio", "", "1", "whirl speed about the mean centre / cage speed", of=lambda h: h.whirl_ratio(h.centre)
     ),
     Quantity(
         "rib_whirl_ratio",

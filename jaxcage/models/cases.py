@@ -7,73 +7,45 @@ as cage speed relative to the rib, eccentricities in micrometres; with the fixed
 rigid rib and circulatory cross-coupling.
 """
 
-import dataclasses
+from typing import Any
 
 from .._arguments import require_x64
 from .._errors import ArgumentError
 from ..bearing import nu2310, published_case, vg
-from ..forces import LandContact, RibFilm, Support, SynchronousImpact, UnbalanceReading
+from ..forces import LandContact, RibFilm, Support, SynchronousImpact
 from .cage import CageModel
 
 
-@dataclasses.dataclass(frozen=True)
-class Constants:
-    """Constants that the paper does not print, in SI units."""
-
-    cage_mass: float
-    support_stiffness: float
-    support_cubic: float
-    support_damping: float
-    support_cross: float
-    land_width: float
-    """Width of each of two lands."""
-    impact_amplitude: float
-    """Amplitude at a cage speed of 1000 rad/s."""
-    impact_exponent: float
-    contact_stiffness: float | None
-    """[N/m^(10/9)]; None if it is given by a force at a penetration of one clearance."""
-    contact_force: float | None = None
-    contact_onset: float = 0.97
-    restitution: float = 1.0
-    gravity: float = 9.81
-    unbalance: UnbalanceReading = "physical"
-
-    def contact_stiffness_in(self, clearance: float) -> float:
-        """Contact stiffness of a case with this clearance [m]."""
-        if self.contact_stiffness is not None:
-            return self.contact_stiffness
-        assert self.contact_force is not None
-        return self.contact_force / clearance ** (10 / 9)
-
-
-CONSTANTS: dict[str, Constants] = {
-    "preliminary": Constants(
-        cage_mass=0.212227,
-        support_stiffness=37402.4,
-        support_cubic=1.0732e13,
-        support_damping=3.3136,
-        support_cross=-36.654,
-        land_width=4.2679e-3,
-        impact_amplitude=109.9051,
-        impact_exponent=1.5091,
-        contact_stiffness=None,
-        contact_force=68992.2,
-    ),
-    "identified": Constants(
-        cage_mass=0.252088,
-        support_stiffness=139446.0,
-        support_cubic=11262400000000.0,
-        support_damping=1.66072,
-        support_cross=1762.43,
-        land_width=0.00145461,
-        impact_amplitude=121.292,
-        impact_exponent=1.48297,
-        contact_stiffness=2407540000.0,
-        restitution=0.999142,
-        unbalance="as_printed",
-    ),
+CONSTANTS: dict[str, dict[str, Any]] = {
+    "preliminary": {
+        "cage_mass": 0.212227,
+        "stiffness": 37402.4,
+        "cubic_stiffness": 1.0732e13,
+        "damping": 3.3136,
+        "cross_stiffness": -36.654,
+        "land_width": 4.2679e-3,
+        "amplitude": 109.9051,
+        "exponent": 1.5091,
+        "contact_force": 68992.2,
+        "restitution": 1.0,
+        "unbalance": "physical",
+    },
+    "identified": {
+        "cage_mass": 0.252088,
+        "stiffness": 139446.0,
+        "cubic_stiffness": 11262400000000.0,
+        "damping": 1.66072,
+        "cross_stiffness": 1762.43,
+        "land_width": 0.00145461,
+        "amplitude": 121.292,
+        "exponent": 1.48297,
+        "contact_stiffness": 2407540000.0,
+        "restitution": 0.999142,
+        "unbalance": "as_printed",
+    },
 }
-"""The sets by name."""
+"""The sets by name: values of the model's parameters in SI units, those of the support and of one of two lands. Instead
+of a stiffness of the contact its force at a penetration of one clearance may be given [N]."""
 
 
 def case(name: str, constants: str = "identified") -> CageModel:
@@ -88,27 +60,25 @@ def case(name: str, constants: str = "identified") -> CageModel:
         raise ArgumentError("constants", said=f"must be one of {', '.join(CONSTANTS)}, but '{constants}' was given.")
     published, found = published_case(name), CONSTANTS[constants]
     gap = published.guidance_gap_mm * 1e-3
+    contact = found.get("contact_stiffness") or found["contact_force"] / gap ** (10 / 9)
     return CageModel(
         bearing=nu2310(),
         lubricant=vg(published.viscosity_grade),
         forces=(
-            RibFilm(land_width=found.land_width),
-            LandContact(
-                stiffness=found.contact_stiffness_in(gap), onset=found.contact_onset, restitution=found.restitution
-            ),
+            RibFilm(land_width=found["land_width"]),
+            LandContact(stiffness=contact, onset=0.97, restitution=found["restitution"]),
             Support(
-                stiffness_x=found.support_stiffness,
-                stiffness_y=found.support_stiffness,
-                damping=found.support_damping,
-                cubic_stiffness=found.support_cubic,
-                cross_stiffness=found.support_cross,
+                stiffness_x=found["stiffness"],
+                stiffness_y=found["stiffness"],
+                damping=found["damping"],
+                cubic_stiffness=found["cubic_stiffness"],
+                cross_stiffness=found["cross_stiffness"],
             ),
-            SynchronousImpact(amplitude=found.impact_amplitude, exponent=found.impact_exponent),
+            SynchronousImpact(amplitude=found["amplitude"], exponent=found["exponent"]),
         ),
-        cage_mass=found.cage_mass,
+        cage_mass=found["cage_mass"],
         guidance_gap=gap,
         eccentricity=published.eccentricity_um * 1e-6,
-        gravity=found.gravity,
         clearance_reading="as_printed",
-        unbalance=found.unbalance,
+        unbalance=found["unbalance"],
     )

@@ -11,13 +11,13 @@ quadratic: F = -(1/2) C_d rho D l |v| v and M = -(1/2) C_n rho (D/2)^4 l |s| s w
 (J. H. Rumbarger, E. G. Filetti and D. Gubernick, J. Lubr. Technol. 95 (1973) 401).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array
 
 from .._arguments import is_concrete
 from .._errors import ArgumentError
@@ -44,11 +44,6 @@ class Raceways(eqx.Module):
     raceway_smoothing: Scalar = parameter(
         "m", 1e-12, 1e-6, "half width over which a raceway contact sets in", default=1e-8
     )
-
-
-def hunt_crossley(restitution_slope: Scalar) -> Scalar:
-    """The factor of the approach speed in Q [s/m]: (3/2) alpha."""
-    return 1.5 * restitution_slope
 
 
 def line_load(overlap: Scalar, rate: Scalar, stiffness: Scalar, damping: Scalar, width: Scalar) -> tuple[Array, Array]:
@@ -113,21 +108,18 @@ class Traction(eqx.Module):
 
 
 def lambert_w(x: Scalar) -> Array:
-    """The upper branch of w exp(w) = x for x > -1/e, by Halley's method. Differentiable."""
+    """The upper branch of w exp(w) = x for x > -1/e. Differentiable.
+
+    Newton's method descends to the root from log(1 + x), which is at or above it, and from 0 if x is negative.
+    """
     x = jnp.asarray(x, dtype=float)
-    # Near the branch point w = -1 + p, elsewhere log(1 + x): both within a third of the root.
-    p = jnp.sqrt(jnp.maximum(2 * (jnp.exp(1.0) * x + 1), 1e-30))
-    start = jnp.where(x < 0, -1 + p - p * p / 3, jnp.log1p(jnp.maximum(x, 0.0)))
 
-    def better(_: Array, w: Array) -> Array:
+    def better(_: Any, w: Array) -> Array:
         e = jnp.exp(w)
-        defect = w * e - x
-        return w - defect / (e * (w + 1) - (w + 2) * defect / (2 * w + 2))
+        return w - (w * e - x) / (e * (w + 1))
 
-    root = jax.lax.fori_loop(0, 12, better, jax.lax.stop_gradient(start))
-    e = jnp.exp(jax.lax.stop_gradient(root))
-    w = jax.lax.stop_gradient(root)
-    return w - (w * e - x) / (e * (w + 1))  # one of Newton's steps, which carries the derivative
+    root = jax.lax.fori_loop(0, 64, better, jnp.log1p(jnp.maximum(x, 0.0)))
+    return better(None, jax.lax.stop_gradient(root))  # the last step carries the derivative
 
 
 class Pockets(eqx.Module):
@@ -191,36 +183,22 @@ class RollerDrag(eqx.Module):
     oil_share: Scalar = parameter("1", 0.0, 1.0, "share of oil in the volume between the rings", default=0.02)
 
 
-def quadratic(velocity: Float[Array, "*n"], speed: Float[Array, "*n"], coefficient: Scalar) -> Float[Array, "*n"]:
-    """-k |v| v along one direction [N], or of a spin [N m]."""
-    return -coefficient * speed * velocity
-
-
-def magnitude(x: Float[Array, "*n"], y: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    """Length of a vector, differentiable at zero."""
-    return jnp.sqrt(x * x + y * y + 1e-24)
-
-
-OfRoller = Scalar
-"""A number of one roller."""
-
-
 class RacewayForces(NamedTuple):
     """Forces of one raceway on a roller."""
 
-    load: OfRoller
+    load: Scalar
     """Q [N], pressing roller and raceway apart."""
-    traction: OfRoller
+    traction: Scalar
     """T [N] on the roller, counter-clockwise about the ring's centre."""
-    arm: OfRoller
+    arm: Scalar
     """h from the roller's centre [m]."""
-    race_arm: OfRoller
+    race_arm: Scalar
     """Distance of the contact from the ring's centre [m]."""
-    lost_in_sliding: OfRoller
+    lost_in_sliding: Scalar
     """Power of the traction [W]."""
-    lost_in_damping: OfRoller
+    lost_in_damping: Scalar
     """Power of Q beyond its elastic part [W]."""
-    sliding: OfRoller
+    sliding: Scalar
     """Speed of the raceway beyond that of the roller's surface, where they meet or would meet [m/s]."""
 
 
@@ -239,92 +217,71 @@ class RacewayConstants(NamedTuple):
     curve: TractionCurve
 
 
-def outer_contact(
-    at: RacewayConstants, radius: OfRoller, radial: OfRoller, orbit: OfRoller, spin: OfRoller
+def raceway_contact(
+    at: RacewayConstants, outer: bool, distance: Scalar, away: Scalar, across: Scalar, spin: Scalar
 ) -> RacewayForces:
-    """The outer raceway on a roller; T and Q are along the tangent and against the radius at the roller."""
-    overlap = radius + at.half - at.radius
-    load, elastic = line_load(overlap, radial, at.stiffness, at.damping, at.smoothing)
-    arm = at.half - overlap / 2
-    race_arm = radius + arm
-    sliding = at.speed * race_arm - (radius * orbit + spin * arm)
-    traction = at.curve(sliding) * load
-    return RacewayForces(load, traction, arm, race_arm, traction * sliding, (load - elastic) * radial, sliding)
+    """The outer or inner raceway on a roller; T and Q are along the tangent and the radius of the raceway.
 
-
-def inner_contact(
-    at: RacewayConstants, distance: OfRoller, away: OfRoller, across: OfRoller, spin: OfRoller
-) -> RacewayForces:
-    """The inner raceway on a roller.
-
-    **Arguments:** distance of the roller's centre from the ring's [m]; velocity of the roller relative to the ring's
-    centre, away from it and across (counter-clockwise) [m/s]; spin.
+    **Arguments:** constants; which raceway; distance of the roller's centre from the ring's [m]; velocity of the roller
+    relative to the ring's centre, away from it and across (counter-clockwise) [m/s]; spin.
     """
-    overlap = at.radius + at.half - distance
-    load, elastic = line_load(overlap, -away, at.stiffness, at.damping, at.smoothing)
+    sense = 1.0 if outer else -1.0
+    overlap = distance + at.half - at.radius if outer else at.radius + at.half - distance
+    load, elastic = line_load(overlap, sense * away, at.stiffness, at.damping, at.smoothing)
     arm = at.half - overlap / 2
-    race_arm = distance - arm
-    sliding = at.speed * race_arm - (across - spin * arm)
+    race_arm = distance + sense * arm
+    sliding = at.speed * race_arm - (across + sense * spin * arm)
     traction = at.curve(sliding) * load
-    return RacewayForces(load, traction, arm, race_arm, traction * sliding, (elastic - load) * away, sliding)
+    return RacewayForces(load, traction, arm, race_arm, traction * sliding, (load - elastic) * sense * away, sliding)
 
 
 class PocketForces(NamedTuple):
     """Forces of the bars on a roller."""
 
-    along: OfRoller
+    along: Scalar
     """Force on the roller along the pocket's tangent t_j [N]."""
-    out: OfRoller
+    out: Scalar
     """Force on the roller along the pocket's radius n_j [N]."""
-    roller_moment: OfRoller
+    roller_moment: Scalar
     """Moment on the roller [N m]."""
-    cage_moment: OfRoller
+    cage_moment: Scalar
     """Moment on the cage about its centre [N m]."""
-    normal: OfRoller
+    normal: Scalar
     """N [N]."""
-    lost_in_sliding: OfRoller
-    lost_in_damping: OfRoller
-    rubbing: OfRoller
+    lost_in_sliding: Scalar
+    lost_in_damping: Scalar
+    rubbing: Scalar
     """N times the sliding speed [W]."""
 
 
-class PocketConstants(NamedTuple):
-    """Constants of a pocket contact."""
-
-    half: Scalar
-    """D/2 [m]."""
-    clearance: Scalar
-    """T, of both sides together [m]."""
-    law: Pockets
-
-
 def pocket_contact(
-    at: PocketConstants,
-    out: OfRoller,
-    along: OfRoller,
-    v_out: OfRoller,
-    v_along: OfRoller,
-    spin: OfRoller,
+    model: Any,
+    out: Scalar,
+    along: Scalar,
+    v_out: Scalar,
+    v_along: Scalar,
+    spin: Scalar,
     cage_speed: Scalar,
 ) -> PocketForces:
     """The bars on a roller.
 
-    **Arguments:** place of the roller's centre from the cage's, along n_j and t_j of its pocket [m]; velocity of the
-    roller's centre relative to the cage's, not to the turning pocket [m/s]; spin and cage speed [rad/s].
+    **Arguments:** the `BearingModel`; place of the roller's centre from the cage's, along n_j and t_j of its pocket
+    [m]; velocity of the roller's centre relative to the cage's, not to the turning pocket [m/s]; spin and cage speed
+    [rad/s].
     """
-    law = at.law
+    law, half = model.pockets, model.bearing.roller_diameter / 2
     side = jnp.where(along >= 0, 1.0, -1.0)
     rate = side * (v_along - cage_speed * out)
-    overlap = side * along - at.clearance / 2
+    overlap = side * along - model.bearing.pocket_clearance / 2
     elastic = law.elastic(overlap)
-    normal = elastic * smooth_plus(1 + hunt_crossley(law.pocket_damping) * rate, 1e-4)
-    sliding = v_out + cage_speed * along - side * at.half * (spin - cage_speed)
+    normal = elastic * smooth_plus(1 + 1.5 * law.pocket_damping * rate, 1e-4)
+    sliding = v_out + cage_speed * along - side * half * (spin - cage_speed)
     friction = -law.pocket_friction * normal * saturated(sliding, law.saturation_speed)
     return PocketForces(
         along=-side * normal,
         out=friction,
-        roller_moment=-side * at.half * friction,
-        cage_moment=out * side * normal + (along + side * at.half) * friction,
+        roller_moment=-side * half * friction,
+        cage_moment=out * side * normal + (along + side * half) * friction,
         normal=normal,
         lost_in_sliding=-friction * sliding,
         lost_in_damping=(normal - elastic) * rate,

@@ -7,7 +7,7 @@ form, so that only a system of the size of the velocities is solved: with J = [[
 """
 
 import abc
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import equinox as eqx
 import jax
@@ -21,7 +21,7 @@ Matrix = tuple[tuple[Array, ...], ...]
 """Rows of scalars: lanes stay innermost, and elimination of a small system unrolls into a few operations."""
 
 
-def lu_factor(a: Matrix) -> Matrix:
+def lu_factor(a: Sequence[Sequence[Array]]) -> Matrix:
     """LU factors of a small matrix of scalars, without pivoting; the diagonal holds the inverse pivots.
 
     No pivoting: the matrices here are shift I - J with a shift of the order of 1/step, close to a multiple of I where
@@ -51,76 +51,49 @@ def lu_solve(lu: Matrix, r: State) -> State:
     return tuple(x)
 
 
-def _shifted(shift: Scalar, a: Matrix) -> Matrix:
-    """shift I - a."""
-    return tuple(tuple(shift - c if i == j else -c for j, c in enumerate(row)) for i, row in enumerate(a))
+class Linearisation(eqx.Module):
+    """A field near one point: value, phase derivative, and solves with shift I - Jacobian.
 
+    Of a second-order system the coordinates, of a first-order one nothing, are eliminated before the solve.
+    """
 
-def _trace(a: Matrix) -> Scalar:
-    return sum((row[i] for i, row in enumerate(a)), start=jnp.zeros(()))
-
-
-class AbstractLinearisation(eqx.Module):
-    """A field near one point: value, phase derivative, and solves with shift I - Jacobian."""
-
-    value: eqx.AbstractVar[State]
-    phase_derivative: eqx.AbstractVar[State]
+    value: State
+    phase_derivative: State
+    a_q: Matrix
+    """Derivative of the acceleration with respect to the coordinates; empty for a first-order system."""
+    a_v: Matrix
+    """Derivative of the acceleration with respect to the velocities, or of the rates with respect to the state."""
+    rate: Scalar
+    """Factor from rates over time to rates over the phase, for both."""
+    scale: State | None = None
+    """Units of value and solves, where the field is in units of a scale."""
 
     @property
-    @abc.abstractmethod
     def divergence(self) -> Scalar:
         """Trace of the Jacobian."""
+        return self.rate * sum((row[i] for i, row in enumerate(self.a_v)), start=jnp.zeros(()))
 
-    @abc.abstractmethod
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         """r -> (shift I - J)^-1 r, factorised once."""
-
-
-class DenseLinearisation(AbstractLinearisation):
-    """Full Jacobian of a first-order system."""
-
-    value: State
-    phase_derivative: State
-    jacobian: Matrix
-
-    @property
-    def divergence(self) -> Scalar:
-        return _trace(self.jacobian)
-
-    def solver(self, shift: Scalar) -> Callable[[State], State]:
-        lu = lu_factor(_shifted(shift, self.jacobian))
-        return lambda r: lu_solve(lu, r)
-
-
-class SecondOrderLinearisation(AbstractLinearisation):
-    """Stiffness and damping matrices of a second-order system, per unit mass."""
-
-    value: State
-    phase_derivative: State
-    a_q: Matrix  # d acceleration / d coordinates
-    a_v: Matrix  # d acceleration / d velocities
-    speed: Scalar
-
-    @property
-    def divergence(self) -> Scalar:
-        return _trace(self.a_v) / self.speed
-
-    def solver(self, shift: Scalar) -> Callable[[State], State]:
-        rate = 1 / self.speed
-        per_shift = 1 / shift
-        lever = rate * per_shift
-        n = len(self.a_q)
-        a = tuple(
-            tuple(rate * (v + lever * q) for v, q in zip(*rows, strict=True))
-            for rows in zip(self.a_v, self.a_q, strict=True)
-        )
-        lu = lu_factor(_shifted(shift, a))
+        n, per_shift = len(self.a_q), 1 / shift
+        lever = self.rate * per_shift
+        a = self.a_v
+        if n:
+            pairs = zip(self.a_v, self.a_q, strict=True)
+            a = tuple(tuple(v + lever * q for v, q in zip(*rows, strict=True)) for rows in pairs)
+        shifted = [[-self.rate * c for c in row] for row in a]
+        for i, row in enumerate(shifted):
+            row[i] = shift + row[i]
+        lu = lu_factor(shifted)
 
         def solve(r: State) -> State:
+            if self.scale is not None:
+                r = multiply(r, self.scale)
             r_q, r_v = r[:n], r[n:]
-            known = tuple(r_v[i] + lever * sum(self.a_q[i][j] * r_q[j] for j in range(n)) for i in range(n))
-            u_v = lu_solve(lu, known)
-            return (*((r_q[i] + rate * u_v[i]) * per_shift for i in range(n)), *u_v)
+            known = tuple(r_v[i] + lever * sum(a * b for a, b in zip(row, r_q)) for i, row in enumerate(self.a_q))
+            u_v = lu_solve(lu, known or r_v)
+            u = (*((r_q[i] + self.rate * u_v[i]) * per_shift for i in range(n)), *u_v)
+            return u if self.scale is None else divide(u, self.scale)
 
         return solve
 
@@ -132,9 +105,9 @@ class AbstractField(eqx.Module):
     def __call__(self, tau: Scalar, y: State) -> State:
         """dy/dtau at phase `tau`."""
 
-    @abc.abstractmethod
-    def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
-        """The field's value and derivatives at one point."""
+    def linearise(self, tau: Scalar, y: State) -> Linearisation:
+        """The field's value and derivatives at one point, for implicit methods."""
+        raise NotImplementedError("This field has no linearisation: its methods are explicit.")
 
 
 def _columns(f: Callable[[State], State], x: State) -> Matrix:
@@ -163,9 +136,9 @@ class FirstOrderField(AbstractField):
     def __call__(self, tau: Scalar, y: State) -> State:
         return tuple(c / self.speed for c in self.rates(tau, y))
 
-    def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
+    def linearise(self, tau: Scalar, y: State) -> Linearisation:
         value, slope = _phase_derivative(lambda t: self(t, y), tau)
-        return DenseLinearisation(value, slope, _columns(lambda z: self(tau, z), y))
+        return Linearisation(value, slope, (), _columns(lambda z: self(tau, z), y), 1.0)
 
 
 class SecondOrderField(AbstractField):
@@ -180,30 +153,13 @@ class SecondOrderField(AbstractField):
         rate = 1 / self.speed
         return (*(c * rate for c in v), *(c * rate for c in self.acceleration(tau, q, v)))
 
-    def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
+    def linearise(self, tau: Scalar, y: State) -> Linearisation:
         n = len(y) // 2
         q, v = y[:n], y[n:]
         value, slope = _phase_derivative(lambda t: self(t, y), tau)
         a_q = _columns(lambda z: self.acceleration(tau, z, v), q)
         a_v = _columns(lambda z: self.acceleration(tau, q, z), v)
-        return SecondOrderLinearisation(value, slope, a_q, a_v, self.speed)
-
-
-class ScaledLinearisation(AbstractLinearisation):
-    """A linearisation in units of `scale`."""
-
-    value: State
-    phase_derivative: State
-    inner: AbstractLinearisation
-    scale: State
-
-    @property
-    def divergence(self) -> Scalar:
-        return self.inner.divergence
-
-    def solver(self, shift: Scalar) -> Callable[[State], State]:
-        solve = self.inner.solver(shift)
-        return lambda r: divide(solve(multiply(r, self.scale)), self.scale)
+        return Linearisation(value, slope, a_q, a_v, 1 / self.speed)
 
 
 class ScaledField(AbstractField):
@@ -215,10 +171,10 @@ class ScaledField(AbstractField):
     def __call__(self, tau: Scalar, y: State) -> State:
         return divide(self.field(tau, multiply(y, self.scale)), self.scale)
 
-    def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
+    def linearise(self, tau: Scalar, y: State) -> Linearisation:
         inner = self.field.linearise(tau, multiply(y, self.scale))
         value, slope = divide(inner.value, self.scale), divide(inner.phase_derivative, self.scale)
-        return ScaledLinearisation(value, slope, inner, self.scale)
+        return Linearisation(value, slope, inner.a_q, inner.a_v, inner.rate, self.scale)
 
 
 def multiply(y: State, scale: State) -> State:

@@ -25,6 +25,9 @@ ESCAPE = 2.0
 """Excursion beyond which a trajectory has left the model for good."""
 HIGHEST = 1e9
 """Highest speed of any system [rad/s]."""
+FASTEST = 300.0
+"""Surface speed of the cage at its land [m/s] beyond which no cage runs: rho v^2 alone is 765 MPa of hoop stress in
+brass, twice what it bears, and what is given in rpm for rad/s is 9.5 times as fast as meant."""
 
 
 class StepLimits(NamedTuple):
@@ -76,25 +79,14 @@ class AbstractForcedSystem(eqx.Module):
     quantities: ClassVar[tuple[Quantity, ...]] = ()
     """Quantities that the model reports of a run, which follow from `beside` and `watched`."""
 
-    @property
-    def beside(self) -> tuple[str, ...]:
-        """Names of the quantities that are integrated beside the state; the state does not follow from them."""
-        return ()
-
-    @property
-    def beside_start(self) -> tuple[float, ...]:
-        """Values of the quantities beside the state at the beginning of a run."""
-        return (0.0,) * len(self.beside)
-
-    @property
-    def watched(self) -> tuple[str, ...]:
-        """Names of the quantities whose largest values are recorded."""
-        return ("excursion",)
-
-    @property
-    def samples(self) -> int:
-        """Number of strobe states of a revolution that a sweep records."""
-        return 1
+    beside: ClassVar[tuple[str, ...]] = ()
+    """Names of the quantities that are integrated beside the state; the state does not follow from them."""
+    beside_start: ClassVar[tuple[float, ...]] = ()
+    """Values of the quantities beside the state at the beginning of a run."""
+    watched: ClassVar[tuple[str, ...]] = ("excursion",)
+    """Names of the quantities whose largest values are recorded."""
+    samples: ClassVar[int] = 1
+    """Number of strobe states of a revolution that a sweep records."""
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -138,6 +130,10 @@ class AbstractForcedSystem(eqx.Module):
         """Numbers by name that the quantities refer to, such as the cage speed in pure rolling."""
         return {}
 
+    def land_speed(self, speed: Scalar) -> Scalar:
+        """Surface speed of the cage at its land [m/s], in models that have one."""
+        return 0.0
+
     def check_speeds(self, speeds: np.ndarray, name: str) -> None:
         """**Raises:** `ValueError`, of the argument `name`, for speeds [rad/s] at which the model makes no sense."""
 
@@ -153,13 +149,13 @@ class AbstractForcedSystem(eqx.Module):
     def starts(self, speed: Scalar) -> tuple[Any, ...]:
         """Initial states a sweep runs from unless told otherwise, the conventional one first."""
 
-    @abc.abstractmethod
     def excursion(self, y: Any) -> Scalar:
         """Distance from the centre of the states for which the model is valid, 1 at their edge; for a cage, eps.
 
         A trajectory must start at 1 or less, is flagged beyond 1, and fails beyond `ESCAPE`. A system without such an
-        edge returns 0.
+        edge returns 0, as by default.
         """
+        return 0.0
 
 
 def require_speeds(model: AbstractForcedSystem, speeds: Any, name: str = "speed") -> None:
@@ -173,6 +169,15 @@ def require_speeds(model: AbstractForcedSystem, speeds: Any, name: str = "speed"
     if np.any(bad := ~((given > 0) & (given <= HIGHEST))):
         said = f"must be positive and finite, at most {HIGHEST:g} rad/s, but {given[bad].flat[0]:g} was given."
         raise ArgumentError(name, said=said)
+    for speed in (given.max(), given.min()) if given.size else ():
+        land = model.land_speed(speed)
+        if is_concrete(land) and (fastest := float(np.max(np.asarray(land)))) > FASTEST:
+            raise ArgumentError(
+                name,
+                said=f"must be in rad/s and leave the cage at most {FASTEST:g} m/s at its land, but {speed:g} was "
+                f"given, which is {speed * 30 / math.pi:.0f} rpm and makes {fastest:.0f} m/s: `jaxcage.rpm({speed:g})` "
+                "makes rad/s of rpm.",
+            )
     model.check_speeds(given, name)
 
 

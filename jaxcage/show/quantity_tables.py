@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from .._parameters import walk
 from ..analysis import Measures, failed, named_lines, scatter
-from ..bearing import Guidance, LoadDistribution, raceway_surface_speed, static_cage_displacement
+from ..bearing import LoadDistribution, static_cage_displacements
 from ..files import configuration
 from .run_figures import Rollers
 from .tables import SHOWN, Column, Table, rows_table, value_table
@@ -81,13 +81,8 @@ def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Tab
 
 def displacements(model: Any, shared: LoadDistribution) -> dict[str, float]:
     """Static displacement of the cage [m] for the three types of guidance."""
-    given = {
-        "guidance_gap": model.guidance_gap,
-        "pocket_clearance": model.bearing.pocket_clearance,
-        "radial_clearance": model.bearing.radial_clearance,
-        "elastic_approach": shared.elastic_approach,
-    }
-    return {guidance: float(static_cage_displacement(guidance, **given)) for guidance in get_args(Guidance)}
+    found = static_cage_displacements(model.bearing, model.guidance_gap, shared.elastic_approach)
+    return {guidance: float(y) for guidance, y in found.items()}
 
 
 def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed: float | None = None) -> Table:
@@ -105,10 +100,9 @@ def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed:
         ("cage speed over shaft speed", float(bearing.cage_speed_ratio), "1"),
     ]
     if shaft_speed is not None:
-        surface = raceway_surface_speed(shaft_speed, bearing.inner_raceway_diameter)
         rows += [
             ("cage speed", float(bearing.cage_speed(shaft_speed)), "rad/s"),
-            ("surface speed of the inner raceway", float(surface), "m/s"),
+            ("surface speed of the inner raceway", float(shaft_speed * bearing.inner_raceway_diameter / 2), "m/s"),
             ("centrifugal force of a roller", float(bearing.roller_centrifugal_force(shaft_speed)), "N"),
         ]
     return value_table(title, rows)

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 
 from .._pytrees import Form, Scalar, State, split
-from ..models import ESCAPE, AbstractField, AbstractForcedSystem, AbstractLinearisation
+from ..models import ESCAPE, AbstractField, AbstractForcedSystem, Linearisation
 from .layout import REVOLUTION
 from .march import march_with_tangents
 from .program import Numbers
@@ -77,7 +77,7 @@ class _CalledField(AbstractField):
     def __call__(self, tau: Scalar, y: State) -> State:
         return evaluated_often(self.structure, self.numbers, tau, y)
 
-    def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
+    def linearise(self, tau: Scalar, y: State) -> Linearisation:
         return self.structure.filled(self.numbers)[0].linearise(tau, y)
 
 

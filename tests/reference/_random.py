@@ -54,6 +54,7 @@ def random_model(seed: int, wide: bool = False) -> CageModel:
     clearance = drawn["guidance_gap"] / (1 if model.clearance_reading == "as_printed" else 2)
     for name in ("contact.smoothing", "film.smoothing"):
         drawn[name] = min(drawn[name], 0.09 * clearance)
+    drawn["viscosity_2"], drawn["viscosity_1"] = sorted((drawn["viscosity_1"], drawn["viscosity_2"]))  # of a warm oil
     model = jc.replace(model, **(drawn | lengths))
     return jc.replace(model, **{"bearing.n_rollers": int(rng.integers(8, 14))})
 
