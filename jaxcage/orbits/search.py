@@ -7,6 +7,7 @@ bifurcations; between them are the unstable ranges of the synchronous orbit.
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -23,7 +24,7 @@ from .branch import Branch, follow_both_ways
 from .continuation import ContinuationProblem, orbit_curves
 from .point import Point
 from .problem import SPEED, Given
-from .step_lengths import StepControl
+from .step_control import StepControl
 
 
 ROUND, ROUNDS = 4, 8  # branches followed at a time, and how often
@@ -33,6 +34,8 @@ PATIENCE_OUT = 3  # the same where only the stable orbits on both sides are want
 OUTWARD = StepControl(first=0.05, longest=0.5, most=400)  # steps along the orbits of a stable range
 ON_BRANCH = 0.03  # largest distance of an orbit on a branch from the branch, in units of the system's scale
 NEARLY = 0.1  # a simulation that moves by less in its last revolution, in units of the scale, approaches an orbit
+SHORT: dict[str, Any] = {"revolutions": 8, "blocks": 1, "keep": 8, "exponents": 0}
+"""Settings of the simulations, which only lead to orbits."""
 Progress = Callable[[str, int, int], None]
 Scale = Callable[[float], np.ndarray]
 """Units of the state at a speed [rad/s]."""
@@ -176,9 +179,8 @@ def synchronous_orbits(
     scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
 
     def simulate(speeds: np.ndarray, sign: float) -> xr.Dataset:
-        short: dict[str, Any] = {"discard": discard, "revolutions": 8, "blocks": 1, "keep": 8, "exponents": 0}
         starts, told = sign * initial_states(system, speeds, None), lambda done, of: say("simulations", done, of)
-        return sweep(system, speeds, starts=starts, **short, method=method, progress=told)
+        return sweep(system, speeds, starts=starts, discard=discard, **SHORT, method=method, progress=told)
 
     settled = simulate(np.linspace(lower, upper, count), 1.0) if settled is None else settled
     speeds = settled["speed"].values
@@ -199,13 +201,12 @@ def synchronous_orbits(
         branches += [b for b in follow_both_ways(problem, starts, steps, PATIENCE) if b is not None]
         waiting = [w for w in waiting if not any(_covers(b, w.speed, w.state, scale) for b in branches)]
     say("branches", ROUNDS, ROUNDS)
-    limits = lower * 30 / np.pi, upper * 30 / np.pi
-    families, stretches = _families(branches, scale), []
-    for piece in _merged([p for i, b in enumerate(branches) for p in _pieces(b, i, limits)], scale):
-        met = [o.start for o in orbits if o.settled and piece.holds(o.speed * 30 / np.pi, o.state, scale(o.speed))]
-        known = {"family": families[piece.stretch.branch], "met": len(met), "met_first": met.count(0)}
-        stretches.append(dataclasses.replace(piece.stretch, **known))
-    return SynchronousOrbits(tuple(branches), tuple(stretches), settled, len(waiting), *limits)
+    families, stretches, rpm = _families(branches, scale), [], lambda speed: speed * 30 / np.pi
+    for part in _merged([p for i, b in enumerate(branches) for p in _stable_parts(b, i, (lower, upper))], scale):
+        met = [o.start for o in orbits if o.settled and part.holds(o.speed, o.state, scale(o.speed))]
+        ends = part.lower, part.upper, rpm(part.lower_speed), rpm(part.upper_speed)
+        stretches.append(Stretch(*ends, part.branch, families[part.branch], len(met), met.count(0)))
+    return SynchronousOrbits(tuple(branches), tuple(stretches), settled, len(waiting), rpm(lower), rpm(upper))
 
 
 # --- orbits from simulations ---------------------------------------------------------------------------------------
@@ -260,67 +261,12 @@ def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
     return family
 
 
-# --- stable stretches ----------------------------------------------------------------------------------------------
-
-
-class _Piece(NamedTuple):
-    """A stable part of one branch, its points by rising speed."""
-
-    stretch: Stretch
-    rpm: np.ndarray
-    state: np.ndarray
-
-    def state_at(self, rpm: float) -> np.ndarray:
-        return np.array([np.interp(rpm, self.rpm, c) for c in self.state.T])
-
-    def holds(self, rpm: float, state: np.ndarray, scale: np.ndarray) -> bool:
-        """Return whether the orbit `state` at `rpm` lies on this piece."""
-        inside = self.stretch.lower_rpm <= rpm <= self.stretch.upper_rpm
-        return inside and bool(np.max(np.abs(self.state_at(rpm) - state) / scale) < ON_BRANCH)
-
-
-def _pieces(branch: Branch, number: int, limits: tuple[float, float]) -> list[_Piece]:
-    """Return the stable parts of a branch over speed, cut to the limits [rpm]."""
-    found = []
-    edges = {p.index: p for p in branch.special if p.edge and p.status == "converged"}
-    bounds = [-1, *np.flatnonzero(np.diff(branch.stable.astype(int))).tolist(), branch.value.size - 1]
-    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
-        if last <= first or not branch.stable[last]:
-            continue
-        points = [edges.get(first), edges.get(last)]
-        rpm, state = branch.speed_rpm[first + 1 : last + 1], branch.state[first + 1 : last + 1]
-        if rpm[0] > rpm[-1]:
-            points, rpm, state = points[::-1], rpm[::-1], state[::-1]
-        low, high = (float(r if p is None else p.speed_rpm) for p, r in zip(points, (rpm[0], rpm[-1]), strict=True))
-        stretch = Stretch(points[0], points[1], max(low, limits[0]), min(high, limits[1]), number)
-        found.append(_Piece(stretch, rpm, state))
-    return found
-
-
-def _merged(pieces: Sequence[_Piece], scale: Scale) -> list[_Piece]:
-    """Return the pieces with those joined that two branches from different starts share."""
-    whole: list[_Piece] = []
-    for piece in sorted(pieces, key=lambda p: p.stretch.lower_rpm):
-        for i, other in enumerate(whole):
-            a, b = other.stretch, piece.stretch
-            rpm = (b.lower_rpm + min(a.upper_rpm, b.upper_rpm)) / 2
-            if b.lower_rpm <= rpm and other.holds(rpm, piece.state_at(rpm), scale(rpm * np.pi / 30)):
-                beyond, top = piece.rpm > other.rpm[-1], b if b.upper_rpm > a.upper_rpm else a
-                joined = dataclasses.replace(a, upper=top.upper, upper_rpm=top.upper_rpm)
-                both = (np.concatenate([x, y[beyond]]) for x, y in zip(other[1:], piece[1:], strict=True))
-                whole[i] = _Piece(joined, *both)
-                break
-        else:
-            whole.append(piece)
-    return whole
-
-
-# --- one stable range -----------------------------------------------------------------------------------------------
+# --- stable ranges --------------------------------------------------------------------------------------------------
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StableRange:
-    """The range of speed in which a machine may run: a stable stretch of a branch of synchronous orbits.
+    """A range of speed in which a machine may run: a stable part of a branch of synchronous orbits.
 
     `lower` and `upper` are the bifurcations that bound it, None where it reaches the limits of the search, and
     `lower_speed` and `upper_speed` [rad/s] its ends. `states` are the orbits along it at `speeds`, both ascending.
@@ -332,10 +278,51 @@ class StableRange:
     upper_speed: float
     speeds: np.ndarray
     states: np.ndarray
+    branch: int = 0
 
     def state_at(self, speed: float) -> np.ndarray:
         """Return the state of the orbit at a speed [rad/s] within the range, by linear interpolation."""
         return np.array([np.interp(speed, self.speeds, c) for c in self.states.T])
+
+    def holds(self, speed: float, state: np.ndarray, scale: np.ndarray) -> bool:
+        """Return whether the orbit `state` at `speed` lies on it, to the accuracy of the steps of a continuation."""
+        inside = self.lower_speed <= speed <= self.upper_speed
+        return inside and bool(np.max(np.abs(self.state_at(speed) - state) / scale) < ON_BRANCH)
+
+
+def _stable_parts(branch: Branch, number: int, limits: tuple[float, float]) -> list[StableRange]:
+    """Return the stable parts of a branch over speed, cut to the limits [rad/s]."""
+    found = []
+    edges = {p.index: p for p in branch.special if p.edge and p.status == "converged"}
+    bounds = [-1, *np.flatnonzero(np.diff(branch.stable.astype(int))).tolist(), branch.value.size - 1]
+    for first, last in itertools.pairwise(bounds):
+        if last <= first or not branch.stable[last]:
+            continue
+        points = [edges.get(first), edges.get(last)]
+        speed, state = branch.speed[first + 1 : last + 1], branch.state[first + 1 : last + 1]
+        if speed[0] > speed[-1]:
+            points, speed, state = points[::-1], speed[::-1], state[::-1]
+        low, high = (float(w if p is None else p.speed) for p, w in zip(points, (speed[0], speed[-1]), strict=True))
+        ends = max(low, limits[0]), min(high, limits[1])
+        found.append(StableRange(points[0], points[1], *ends, speed, state, number))
+    return found
+
+
+def _merged(parts: Sequence[StableRange], scale: Scale) -> list[StableRange]:
+    """Return the parts with those joined that two branches from different starts share."""
+    whole: list[StableRange] = []
+    for b in sorted(parts, key=lambda p: p.lower_speed):
+        for i, a in enumerate(whole):
+            middle = (b.lower_speed + min(a.upper_speed, b.upper_speed)) / 2
+            if b.lower_speed <= middle and a.holds(middle, b.state_at(middle), scale(middle)):
+                beyond, top = b.speeds > a.speeds[-1], b if b.upper_speed > a.upper_speed else a
+                speeds, states = np.append(a.speeds, b.speeds[beyond]), np.vstack([a.states, b.states[beyond]])
+                ends = {"upper": top.upper, "upper_speed": top.upper_speed}
+                whole[i] = dataclasses.replace(a, speeds=speeds, states=states, **ends)
+                break
+        else:
+            whole.append(b)
+    return whole
 
 
 def stable_range(
@@ -360,22 +347,19 @@ def stable_range(
     if near:
         waiting = [_Settled(np.asarray(state), float(speed), 0, True) for state, speed in near]
     else:
-        short: dict[str, Any] = {"discard": 250, "revolutions": 8, "blocks": 1, "keep": 8, "exponents": 0}
-        settled = sweep(system, np.linspace(*operating, 5), **short, method=method)
+        settled = sweep(system, np.linspace(*operating, 5), discard=250, **SHORT, method=method)
         waiting = _stable_orbits(problem, settled, scale)
-    pieces: list[_Piece] = []
+    parts: list[StableRange] = []
     for _ in range(TRIES):
         if not waiting:
             break
         picked = waiting[len(waiting) // 2]
         (found,) = follow_both_ways(problem, [(picked.state, picked.speed)], OUTWARD, PATIENCE_OUT)
         waiting = [w for w in waiting if w is not picked and not (found and _covers(found, w.speed, w.state, scale))]
-        pieces += _pieces(found, 0, (limits[0] * 30 / np.pi, limits[1] * 30 / np.pi)) if found else []
-    low, high = (end * 30 / np.pi for end in operating)
-    overlap = lambda p: min(p.stretch.upper_rpm, high) - max(p.stretch.lower_rpm, low)
-    best = max(_merged(pieces, scale), key=overlap, default=None)
+        parts += _stable_parts(found, 0, limits) if found else []
+    overlap = lambda part: min(part.upper_speed, operating[1]) - max(part.lower_speed, operating[0])
+    best = max(_merged(parts, scale), key=overlap, default=None)
     if best is None or overlap(best) < 0:
         return None
-    s, rise = best.stretch, np.argsort(best.rpm)
-    ends = s.lower_rpm * np.pi / 30, s.upper_rpm * np.pi / 30
-    return StableRange(s.lower, s.upper, *ends, best.rpm[rise] * np.pi / 30, best.state[rise])
+    rise = np.argsort(best.speeds)
+    return dataclasses.replace(best, speeds=best.speeds[rise], states=best.states[rise])
