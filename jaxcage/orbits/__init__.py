@@ -49,7 +49,6 @@ from .point import Point as Point
 from .problem import pick as pick
 from .search import (
     StableRange as StableRange,
-    Stretch as Stretch,
     SynchronousOrbits as SynchronousOrbits,
     stable_range as stable_range,
     synchronous_orbits as synchronous_orbits,

@@ -16,7 +16,7 @@ from .branch import follow_both_ways
 from .continuation import Path, orbit_curves
 from .location import sign_changes
 from .newton import AbstractEquations, Found, as_root, refined
-from .orbit import Orbit, PointGuess, periodic_orbit, sorted_multipliers
+from .orbit import SPUN, Orbit, PointGuess, periodic_orbit, sorted_multipliers
 from .point import (
     Kind,
     Outcome,
@@ -53,7 +53,6 @@ from .step_control import Points, StepControl
 
 TANGENTIAL = 1e-2  # smallest change of |mu| for a relative change of the parameter by 1 at a crossing
 ON_CIRCLE = 1e-5  # largest squared distance of a critical multiplier: a double one is known to the root of rounding
-SPUN = 200  # revolutions of the simulation that finds an orbit at the value of the parameter
 WALK = StepControl(first=0.05, longest=0.25, most=250)  # along a branch on which a bifurcation is looked for
 
 

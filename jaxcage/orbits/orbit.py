@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from .point import Point
 
 ROUNDING = 1e-13
-SPUN = 400  # revolutions of the simulation that leads to an orbit
+SPUN = 200  # revolutions of the simulation that leads to an orbit
+AT_REST = 1e-3  # a simulation has led to one if it moves by less, in units of the system's scale
 LIOUVILLE_TOLERANCE = 1e-3  # largest disagreement in log|det M| at which multipliers are trusted
 ADAPTIVE_PARTS, MOST_PARTS = 256, 4096
 """Parts of a revolution for integrating the divergence: with a method that has no steps, and with steps that are a
@@ -184,20 +185,26 @@ def divergence_integral(
 def _simulated(
     problem: OrbitProblem, given: Given, start: Array, revolutions: Array, counts: Counts
 ) -> Float[Array, " dim"]:
-    """Return the state after `revolutions` from `start`, or `start` itself where the simulation fails."""
-    chosen = by_steps(problem, jnp.minimum(counts.last, ENOUGH)).method
-    strobe, row = strobe_map(given.system, given.speed, chosen), tuple(start[k] for k in range(start.size))
-    end = jnp.stack(jax.lax.fori_loop(0, revolutions, lambda _, y: strobe(y).y, row))
-    return jnp.where(jnp.all(jnp.isfinite(end)), end, start)
+    """Return the state after `revolutions` from `start`, and as many with twice the steps until it is at rest."""
+
+    def turn(i: Array, carry: tuple) -> tuple:
+        y, done = carry
+        strobe = strobe_map(given.system, given.speed, by_steps(problem, counts.steps(i)).method)
+        begin = jnp.where(jnp.all(jnp.isfinite(y)), y, start)
+        row, spin = tuple(begin[k] for k in range(start.size)), jnp.where(done, 0, revolutions)
+        z = jnp.stack(jax.lax.fori_loop(0, spin, lambda _, y: strobe(y).y, row))
+        return z, done | (jnp.max(jnp.abs(z - y) / problem.scale) < AT_REST * counts.tolerance)
+
+    return jax.lax.fori_loop(0, counts.tries, turn, (start, jnp.array(False)))[0]
 
 
 @compiled
 def _find(
-    problem: OrbitProblem, counts: Counts, given: Given, guess: Array, revolutions: Any
+    problem: OrbitProblem, counts: Counts, spinning: Counts, given: Given, guess: Array, revolutions: Any
 ) -> tuple[Orbit, OrbitEquations, Array]:
     """Find the orbit, without derivatives; return its equations and unknowns, too."""
     if revolutions is not None:
-        guess = _simulated(problem, given, guess, revolutions, counts)
+        guess = _simulated(problem, given, guess, revolutions, spinning)
     equations = OrbitEquations(problem)
     u, found = refined(equations, given, guess / problem.scale, counts)
     converged = found.converged & ~((counts.tolerance > 0) & (found.error > SETTLED))
@@ -249,7 +256,7 @@ def periodic_orbit(
     - `system`, `speed`: any forced system, and its speed [rad/s].
     - `periods`: revolutions after which the orbit closes.
     - `guess`: a state [SI] near the orbit, or an `Orbit`; by default the first of the system's own starts.
-    - `revolutions`: revolutions of simulation before Newton's method; by default 400 without a guess, none with one.
+    - `revolutions`: revolutions of simulation before Newton's method; by default 200 without a guess, none with one.
     - `method`: integration method; by default as many steps as the orbit needs, by Runge-Kutta or, if that finds no
         orbit that stays where it is with more steps, by Rodas4 (never under `jit` and `vmap`).
 
@@ -263,6 +270,7 @@ def periodic_orbit(
         require_at_least(0, revolutions=revolutions)
     given = Given(system, jnp.asarray(speed, dtype=float))
     start = guess_state(system, given.speed, guess)
+    once = revolutions is not None  # no more revolutions than asked for
     if revolutions is None and guess is None:
         revolutions = SPUN
     spin = None if revolutions is None else jnp.asarray(revolutions)
@@ -271,7 +279,9 @@ def periodic_orbit(
         here, begin = frozen((given, start))
         problem = make_problem(here, (), jnp.ones(0), periods, method)
         counts = counts.near(guess.steps if isinstance(guess, Orbit) else None)
-        found, equations, u = _find(problem, counts, here, begin, spin)
+        enough = jnp.minimum(counts.last, ENOUGH)
+        first = enough if once else jnp.minimum(counts.first * 2, enough)
+        found, equations, u = _find(problem, counts, counts._replace(first=first, last=enough), here, begin, spin)
         if not is_traced(given):
             return found
         u, monodromy = as_root(given, equations=equations, u=u)

@@ -42,11 +42,13 @@ Scale = Callable[[float], np.ndarray]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Stretch:
-    """A stable part of a branch of synchronous orbits, with its ends, None if the range or the branch ends there.
+class StableRange:
+    """A stable part of a branch of synchronous orbits: a range of speed in which a machine may run.
 
-    Branches that are parts of one have the same `family`. `met` simulations settled on the stretch, `met_first` of them
-    from the system's conventional start, the first of its initial states.
+    `lower` and `upper` are the bifurcations at its ends, None if the range searched or the branch ends there. `states`
+    are the orbits along it at `speeds` [rad/s], both ascending. Branches that are parts of one have the same `family`.
+    `met` simulations settled on it, `met_first` of them from the system's conventional start, the first of its initial
+    states.
     """
 
     lower: Point | None
@@ -57,11 +59,18 @@ class Stretch:
     family: int = 0
     met: int = 0
     met_first: int = 0
+    speeds: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
+    states: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def width_rpm(self) -> float:
         """Range of speed [rpm]."""
         return self.upper_rpm - self.lower_rpm
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest speed [rad/s]."""
+        return self.lower_rpm * np.pi / 30, self.upper_rpm * np.pi / 30
 
     @property
     def error_rpm(self) -> float:
@@ -72,6 +81,15 @@ class Stretch:
     def confirmed(self) -> bool:
         """Whether both ends are located to less than its width."""
         return not self.error_rpm > self.width_rpm
+
+    def state_at(self, speed: float) -> np.ndarray:
+        """Return the state of the orbit at a speed [rad/s] within the range, by linear interpolation."""
+        return np.array([np.interp(speed, self.speeds, c) for c in self.states.T])
+
+    def holds(self, speed: float, state: np.ndarray, scale: np.ndarray) -> bool:
+        """Return whether the orbit `state` at `speed` lies on it, to the accuracy of the steps of a continuation."""
+        inside = self.lower_rpm <= speed * 30 / np.pi <= self.upper_rpm
+        return inside and bool(np.max(np.abs(self.state_at(speed) - state) / scale) < ON_BRANCH)
 
     def __str__(self) -> str:
         end = lambda p, rpm: f"{rpm:.1f} ({'range' if p is None else p.kind})"
@@ -89,7 +107,7 @@ class SynchronousOrbits:
     """
 
     branches: tuple[Branch, ...]
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[StableRange, ...]
     sweep: xr.Dataset
     missed: int
     lower_rpm: float
@@ -161,7 +179,6 @@ def synchronous_orbits(
     *,
     count: int = 251,
     discard: int = 250,
-    steps: StepControl = StepControl(most=1500),
     settled: xr.Dataset | None = None,
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
@@ -169,8 +186,8 @@ def synchronous_orbits(
     """Find and follow the synchronous orbits between two speeds [rad/s].
 
     **Arguments:** system and range; number of speeds that are simulated from each of the system's initial states, and
-    revolutions left out; steps of the continuation, in units of 1/20 of the range; a sweep that was made before,
-    instead of simulations. Simulations from the opposites of the initial states serve only to find orbits.
+    revolutions left out; a sweep that was made before, instead of simulations. Simulations from the opposites of the
+    initial states serve only to find orbits.
 
     **Returns:** `SynchronousOrbits`. Simulations may miss stable orbits with a small basin.
     """
@@ -198,15 +215,15 @@ def synchronous_orbits(
         say("branches", turn, ROUNDS)
         picked = np.unique(np.linspace(0, len(waiting) - 1, min(ROUND, len(waiting))).round().astype(int))
         starts = [(waiting[i].state, waiting[i].speed) for i in picked]
-        branches += [b for b in follow_both_ways(problem, starts, steps, PATIENCE) if b is not None]
+        branches += [b for b in follow_both_ways(problem, starts, StepControl(most=1500), PATIENCE) if b is not None]
         waiting = [w for w in waiting if not any(_covers(b, w.speed, w.state, scale) for b in branches)]
     say("branches", ROUNDS, ROUNDS)
-    families, stretches, rpm = _families(branches, scale), [], lambda speed: speed * 30 / np.pi
-    for part in _merged([p for i, b in enumerate(branches) for p in _stable_parts(b, i, (lower, upper))], scale):
+    families, stretches, limits = _families(branches, scale), [], (lower * 30 / np.pi, upper * 30 / np.pi)
+    for part in _merged([p for i, b in enumerate(branches) for p in _stable_parts(b, i, limits)], scale):
         met = [o.start for o in orbits if o.settled and part.holds(o.speed, o.state, scale(o.speed))]
-        ends = part.lower, part.upper, rpm(part.lower_speed), rpm(part.upper_speed)
-        stretches.append(Stretch(*ends, part.branch, families[part.branch], len(met), met.count(0)))
-    return SynchronousOrbits(tuple(branches), tuple(stretches), settled, len(waiting), rpm(lower), rpm(upper))
+        known = {"family": families[part.branch], "met": len(met), "met_first": met.count(0)}
+        stretches.append(dataclasses.replace(part, **known))
+    return SynchronousOrbits(tuple(branches), tuple(stretches), settled, len(waiting), *limits)
 
 
 # --- orbits from simulations ---------------------------------------------------------------------------------------
@@ -264,60 +281,35 @@ def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
 # --- stable ranges --------------------------------------------------------------------------------------------------
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class StableRange:
-    """A range of speed in which a machine may run: a stable part of a branch of synchronous orbits.
-
-    `lower` and `upper` are the bifurcations that bound it, None where it reaches the limits of the search, and
-    `lower_speed` and `upper_speed` [rad/s] its ends. `states` are the orbits along it at `speeds`, both ascending.
-    """
-
-    lower: Point | None
-    upper: Point | None
-    lower_speed: float
-    upper_speed: float
-    speeds: np.ndarray
-    states: np.ndarray
-    branch: int = 0
-
-    def state_at(self, speed: float) -> np.ndarray:
-        """Return the state of the orbit at a speed [rad/s] within the range, by linear interpolation."""
-        return np.array([np.interp(speed, self.speeds, c) for c in self.states.T])
-
-    def holds(self, speed: float, state: np.ndarray, scale: np.ndarray) -> bool:
-        """Return whether the orbit `state` at `speed` lies on it, to the accuracy of the steps of a continuation."""
-        inside = self.lower_speed <= speed <= self.upper_speed
-        return inside and bool(np.max(np.abs(self.state_at(speed) - state) / scale) < ON_BRANCH)
-
-
 def _stable_parts(branch: Branch, number: int, limits: tuple[float, float]) -> list[StableRange]:
-    """Return the stable parts of a branch over speed, cut to the limits [rad/s]."""
+    """Return the stable parts of a branch over speed, cut to the limits [rpm]."""
     found = []
     edges = {p.index: p for p in branch.special if p.edge and p.status == "converged"}
     bounds = [-1, *np.flatnonzero(np.diff(branch.stable.astype(int))).tolist(), branch.value.size - 1]
     for first, last in itertools.pairwise(bounds):
         if last <= first or not branch.stable[last]:
             continue
-        points = [edges.get(first), edges.get(last)]
-        speed, state = branch.speed[first + 1 : last + 1], branch.state[first + 1 : last + 1]
-        if speed[0] > speed[-1]:
-            points, speed, state = points[::-1], speed[::-1], state[::-1]
-        low, high = (float(w if p is None else p.speed) for p, w in zip(points, (speed[0], speed[-1]), strict=True))
-        ends = max(low, limits[0]), min(high, limits[1])
-        found.append(StableRange(points[0], points[1], *ends, speed, state, number))
+        along, points = np.arange(first + 1, last + 1), [edges.get(first), edges.get(last)]
+        if branch.speed[along[0]] > branch.speed[along[-1]]:
+            along, points = along[::-1], points[::-1]
+        ends = zip(points, branch.speed_rpm[along[[0, -1]]], strict=True)
+        low, high = (float(rpm if p is None else p.speed_rpm) for p, rpm in ends)
+        part = StableRange(points[0], points[1], max(low, limits[0]), min(high, limits[1]), number)
+        found.append(dataclasses.replace(part, speeds=branch.speed[along], states=branch.state[along]))
     return found
 
 
 def _merged(parts: Sequence[StableRange], scale: Scale) -> list[StableRange]:
     """Return the parts with those joined that two branches from different starts share."""
     whole: list[StableRange] = []
-    for b in sorted(parts, key=lambda p: p.lower_speed):
+    for b in sorted(parts, key=lambda p: p.lower_rpm):
         for i, a in enumerate(whole):
-            middle = (b.lower_speed + min(a.upper_speed, b.upper_speed)) / 2
-            if b.lower_speed <= middle and a.holds(middle, b.state_at(middle), scale(middle)):
-                beyond, top = b.speeds > a.speeds[-1], b if b.upper_speed > a.upper_speed else a
+            rpm = (b.lower_rpm + min(a.upper_rpm, b.upper_rpm)) / 2
+            speed = rpm * np.pi / 30
+            if b.lower_rpm <= rpm and a.holds(speed, b.state_at(speed), scale(speed)):
+                beyond, top = b.speeds > a.speeds[-1], b if b.upper_rpm > a.upper_rpm else a
                 speeds, states = np.append(a.speeds, b.speeds[beyond]), np.vstack([a.states, b.states[beyond]])
-                ends = {"upper": top.upper, "upper_speed": top.upper_speed}
+                ends = {"upper": top.upper, "upper_rpm": top.upper_rpm}
                 whole[i] = dataclasses.replace(a, speeds=speeds, states=states, **ends)
                 break
         else:
@@ -356,8 +348,9 @@ def stable_range(
         picked = waiting[len(waiting) // 2]
         (found,) = follow_both_ways(problem, [(picked.state, picked.speed)], OUTWARD, PATIENCE_OUT)
         waiting = [w for w in waiting if w is not picked and not (found and _covers(found, w.speed, w.state, scale))]
-        parts += _stable_parts(found, 0, limits) if found else []
-    overlap = lambda part: min(part.upper_speed, operating[1]) - max(part.lower_speed, operating[0])
+        parts += _stable_parts(found, 0, (limits[0] * 30 / np.pi, limits[1] * 30 / np.pi)) if found else []
+    low, high = (end * 30 / np.pi for end in operating)
+    overlap = lambda part: min(part.upper_rpm, high) - max(part.lower_rpm, low)
     best = max(_merged(parts, scale), key=overlap, default=None)
     if best is None or overlap(best) < 0:
         return None
