@@ -111,7 +111,7 @@ def main() -> None:
             if before is None or not edges_of(before):
                 continue
             done += 1
-            fresh = edges_of(stable_range(other, (before.lower_speed, before.upper_speed), limits))
+            fresh = edges_of(stable_range(other, before.ends, limits))
             for end, point in edges_of(before).items():
                 began = time.perf_counter()
                 found = follow(model, point, other, lower=limits[0], upper=limits[1], name=end)

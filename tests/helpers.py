@@ -46,6 +46,11 @@ def in_other_units(model: jc.CageModel, base: str, factor: float) -> jc.CageMode
     return jax.tree.map(lambda x: scaled.get(id(x), x), model)  # `replace` would ask for SI
 
 
+def edge_speed(system: Any, point: jc.Point, method: Any = None) -> float:
+    """Speed [rad/s] of the edge near a point, by Newton's method; NaN if it is not found."""
+    return jc.sensitivity(system, point, method=method).value_rpm * np.pi / 30
+
+
 def beyond_range(model: Any, **values: Any) -> Any:
     """The model with values that `replace` may refuse, as limits of what a formula says."""
     now = jc.parameters(model)

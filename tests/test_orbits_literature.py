@@ -59,7 +59,6 @@ def test_multipliers_of_damped_mathieu(a, z):
 DAMPED = [
     ("period-doubling", 0.1, (-0.2, 0.0), -1),
     ("period-doubling", 0.2, (1.5, 1.8), -1),
-    ("branch-point", 0.1, (-0.6, -0.3), 1),
 ]
 
 

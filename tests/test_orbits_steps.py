@@ -6,12 +6,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import reference
+from helpers import edge_speed
 from laws import double_well
 from literature import DUFFING_DOUBLINGS
 from reference import bifurcation as shooting
 
 import jaxcage as jc
-from jaxcage.orbits import Point, edge_speed, sensitivity
+from jaxcage.orbits import Point, sensitivity
 from jaxcage.solve import FixedSteps, strobe_map
 
 

@@ -12,13 +12,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import reference
-from helpers import raw_sweep
+from helpers import edge_speed, raw_sweep
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
 from jaxcage.files import ConfigError, configuration, save_model
 from jaxcage.forces import AbstractForce, AbstractForcing, parameter
-from jaxcage.orbits import Point, edge_speed
+from jaxcage.orbits import Point
 
 
 class ViscousDrag(AbstractForce):

@@ -34,7 +34,6 @@ from .measures import (
     cage_forces as cage_forces,
     cage_history as cage_history,
     measures as measures,
-    relative_state as relative_state,
 )
 from .rollers import (
     Around as Around,

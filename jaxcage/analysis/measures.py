@@ -1,6 +1,6 @@
 """Measures of a time history: the quantities that its model reports, and the forces on a cage along it."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -17,49 +17,47 @@ from .labels import scatter
 
 
 BATCH = 256
-"""Samples whose forces are worked out at a time where the speed changes from sample to sample."""
-
-Histories = dict[str, tuple[Array, Array, Array]]
-"""(F_x, F_y, moment) of each force at every sample."""
-
-
-def relative_state(
-    model: CageModel, state: Float[np.ndarray, "n dim"]
-) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]]:
-    """Position [m] and velocity [m/s] of the cage centre relative to the rib.
-
-    **Raises:** `ValueError` for states of another model.
-    """
-    dim = model.dimension
-    if state.shape[-1] != dim:
-        raise ArgumentError("state", said=f"must have {dim} components, but it has {state.shape[-1]}.")
-    q, v = state[:, : dim // 2], state[:, dim // 2 :]
-    if dim == 4:
-        return q, v
-    return q[:, :2] - q[:, 2:], v[:, :2] - v[:, 2:]
-
-
-@compiled
-def _forces_at_one_speed(
-    model: CageModel, speed: Array, tau: Float[Array, " n"], motion: Float[Array, "n 4"]
-) -> Histories:
-    cage = model.cage_at(speed)
-    forces: Any = jax.vmap(lambda t, m: cage.forces(t, *m))  # of many samples, so not `Force` any more
-    return forces(tau, motion)
+"""Samples whose forces are worked out at a time."""
 
 
 @compiled
 def _forces(
-    model: CageModel,
-    speed: Float[Array, " n"],
-    tau: Float[Array, " n"],
-    motion: Float[Array, "n 4"],
-) -> Histories:
+    model: CageModel, speed: Float[Array, " n"], tau: Float[Array, " n"], motion: Float[Array, "n 4"]
+) -> dict[str, tuple[Array, Array, Array]]:
+    """(F_x, F_y, moment) of each force at every sample."""
+
     def at(sample: tuple[Array, Array, Array]) -> dict[str, Force]:
         omega, t, m = sample
         return model.cage_at(omega).forces(t, *m)
 
     return jax.lax.map(at, (speed, tau, motion), batch_size=BATCH)
+
+
+def cage_history(model: CageModel, trajectory: Trajectory) -> CageHistory:
+    """Motion of a cage relative to the rib along a trajectory, and the forces on it.
+
+    **Raises:** `ValueError` for a trajectory of another model.
+    """
+    require_x64()
+    state, dim = trajectory.state, model.dimension
+    if state.shape[-1] != dim:
+        raise ArgumentError("trajectory", said=f"must have states of {dim} numbers, but has {state.shape[-1]}.")
+    q, v = state[:, : dim // 2], state[:, dim // 2 :]
+    position, velocity = (q, v) if dim == 4 else (q[:, :2] - q[:, 2:], v[:, :2] - v[:, 2:])
+    motion = np.concatenate([position, velocity], axis=1)
+    along = _forces(model, *map(jax.numpy.asarray, (trajectory.speed, trajectory.tau, motion)))
+    names = (*FORCES, *(type(law).__name__ for law in model.extra))  # programs return a dictionary sorted
+    return CageHistory(
+        speed=trajectory.speed,
+        phase=float(trajectory.tau[-1] - trajectory.tau[0]),
+        position=position,
+        velocity=velocity,
+        forces={name: np.stack(along[name][:2], axis=1) for name in names},
+        drag_power=-np.asarray(along["film"][2]) * trajectory.speed,
+        clearance=float(model.clearance),
+        peak=trajectory.peak,
+        error=trajectory.error,
+    )
 
 
 def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.ndarray, "n 2"]]:
@@ -68,21 +66,7 @@ def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.
     **Returns:** `film`, `contact`, `support`, `impact`, `unbalance`, `weight` and those of the model's `extra`
     by the names of their classes, each (F_x, F_y) [N] at every sample, at the speed of that sample.
     """
-    return {name: np.stack(force[:2], axis=1) for name, force in _along(model, trajectory).items()}
-
-
-def _along(model: CageModel, trajectory: Trajectory) -> Histories:
-    """Every force and moment at each sample."""
-    require_x64()
-    position, velocity = relative_state(model, trajectory.state)
-    motion = jax.numpy.asarray(np.concatenate([position, velocity], axis=1))
-    tau, speed = jax.numpy.asarray(trajectory.tau), jax.numpy.asarray(trajectory.speed)
-    if np.all(trajectory.speed == trajectory.speed[0]):
-        forces = _forces_at_one_speed(model, speed[0], tau, motion)
-    else:
-        forces = _forces(model, speed, tau, motion)
-    names = (*FORCES, *(type(law).__name__ for law in model.extra))
-    return {name: forces[name] for name in names}  # programs return a dictionary sorted
+    return dict(cage_history(model, trajectory).forces)
 
 
 class Measured(NamedTuple):
@@ -139,20 +123,3 @@ def _from_integrals(model: AbstractForcedSystem, trajectory: Trajectory) -> Meas
     numbers = {name: np.array([float(x)]) for name, x in model.reference(float(trajectory.speed[0])).items()}
     found = averaged(model.quantities, model.beside, model.watched, each[None], largest[None], numbers, 1.0)
     return Measures({q.name: Measured(q, float(whole[0]), float(scatter(blocks[0]))) for q, whole, blocks in found})
-
-
-def cage_history(model: CageModel, trajectory: Trajectory) -> CageHistory:
-    """Motion of a cage along a trajectory, and the forces on it."""
-    position, velocity = relative_state(model, trajectory.state)
-    along = _along(model, trajectory)
-    return CageHistory(
-        speed=trajectory.speed,
-        phase=float(trajectory.tau[-1] - trajectory.tau[0]),
-        position=position,
-        velocity=velocity,
-        forces={name: np.stack(force[:2], axis=1) for name, force in along.items()},
-        drag_power=-np.asarray(along["film"][2]) * trajectory.speed,
-        clearance=float(model.clearance),
-        peak=trajectory.peak,
-        error=trajectory.error,
-    )

@@ -11,6 +11,8 @@ from ..models import RollerHistory
 from .spectra import OrderSpectrum, Peak, dominant_orders, spectrum_of
 
 
+PARTS = 36
+"""Parts of the circumference."""
 SHARES = (0.5, 0.9, 0.99, 0.999)
 """Shares of the time, for the distribution of the pocket forces."""
 LINES = 5
@@ -37,15 +39,9 @@ class Around:
     """Largest pocket force at a sample."""
 
 
-def around(history: RollerHistory, bins: int = 36) -> Around:
-    """Slips, loads and pocket forces over the circumference, from all rollers as they pass.
-
-    **Arguments:** history; parts of the circumference.
-
-    **Raises:** `ValueError` for fewer than 2 parts.
-    """
-    if bins < 2:
-        raise ArgumentError("bins", said=f"must be at least 2, but {bins} was given.")
+def around(history: RollerHistory) -> Around:
+    """Slips, loads and pocket forces over the circumference, from all rollers as they pass."""
+    bins = PARTS
     where = np.floor(np.mod(history.roller_angle, 2 * np.pi) * bins / (2 * np.pi)).astype(int) % bins
     weight = np.broadcast_to(np.gradient(history.time)[:, None], where.shape)
     total = np.bincount(where.ravel(), weight.ravel(), bins)

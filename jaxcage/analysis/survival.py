@@ -55,7 +55,6 @@ def calm_at_the_end(
     scale: Float[np.ndarray, "*#lanes dim"],
     growth: Float[np.ndarray, "lanes blocks"],
     block: int,
-    confirm: int = CONFIRM,
 ) -> Bool[np.ndarray, " lanes"]:
     """Lanes that end on a periodic orbit or a torus, or on their way to one.
 
@@ -63,9 +62,9 @@ def calm_at_the_end(
     blocks is zero or below within its error: two standard errors, and what blocks of that length cannot tell.
 
     **Arguments:** the last strobe states; characteristic magnitudes of the state; mean growth per revolution of each
-    block; revolutions per block; number of blocks that are the end.
+    block; revolutions per block.
     """
-    end = growth[:, -confirm:]
+    end = growth[:, -CONFIRM:]
     exponent = np.mean(end, axis=1)
     error = scatter(end, axis=1) if end.shape[1] > 1 else np.zeros(exponent.shape)
     unknown = max(TORUS_THRESHOLD, 1 / (block * end.shape[1]))
@@ -78,15 +77,13 @@ def escape_times(
     block: int,
     *,
     failed: Bool[np.ndarray, " lanes"] | None = None,
-    confirm: int = CONFIRM,
-    threshold: float | int | None = None,
 ) -> tuple[Float[np.ndarray, " lanes"], int]:
     """After how many revolutions each lane stays calm to the end of the run.
 
     Chaos dips: with an exponent of 0.15 and a scatter of 0.1 between blocks of 25 revolutions one block in four cannot
     be told from calm. So a lane escapes after the last block that is not calm, and only if it is calm at the end by its
-    label too, and in the last `confirm` blocks. A chaotic lane of which a share p of the blocks dips passes for escaped
-    with a probability of p**confirm at most; `confirm` must be chosen so that this times the number of lanes is small.
+    label too, and in the last `CONFIRM` blocks. A chaotic lane of which a share p of the blocks dips passes for escaped
+    with a probability of p**CONFIRM at most.
     Where p comes near 1, chaos is too weak for the blocks, and lanes seem calm long before they are.
 
     What happens in those last blocks is not judged: the time to which lanes are followed, the horizon, ends before
@@ -98,24 +95,18 @@ def escape_times(
     - `calm_end`: lanes that end on a periodic orbit or a torus (`calm_at_the_end`).
     - `block`: revolutions per block.
     - `failed`: lanes that did not finish; those with growth that is not finite have failed, too.
-    - `confirm`: blocks at the end that must be calm.
-    - `threshold`: largest growth of a calm block, by default `calm_threshold(block)`.
 
     **Returns:** for each lane the revolutions after which it is calm, counted from the first block, a multiple of
     `block`: 0 for one that always is, infinity for one that is chaotic at the horizon, NaN for one that failed; and the
     horizon [revolutions].
-
-    **Raises:** `ValueError` where the blocks are not more than those to confirm with.
     """
     lanes, blocks = growth.shape
-    if not 1 <= confirm < blocks:
-        raise ArgumentError("confirm", said=f"must lie between 1 and the {blocks - 1} blocks before, but is {confirm}.")
     lost = ~np.all(np.isfinite(growth), axis=1) | (np.zeros(lanes, dtype=bool) if failed is None else failed)
-    restless = growth > (calm_threshold(block) if threshold is None else threshold)
+    restless = growth > calm_threshold(block)
     last = np.max(np.where(restless, np.arange(1, blocks + 1), 0), axis=1)
-    escaped = calm_end & (last <= blocks - confirm)
+    escaped = calm_end & (last <= blocks - CONFIRM)
     times = np.where(escaped, last * float(block), np.inf)
-    return np.where(lost, np.nan, times), (blocks - confirm) * block
+    return np.where(lost, np.nan, times), (blocks - CONFIRM) * block
 
 
 @dataclasses.dataclass(frozen=True)

@@ -193,14 +193,15 @@ class OperatingRange:
 
     def _anchor(self, place: np.ndarray, found: StableRange) -> _Anchor:
         """The anchor at a place with its stable range. **Raises:** `InputError` for an end that is no bifurcation."""
-        for point, end, limit in zip((found.lower, found.upper), (found.lower_speed, found.upper_speed), self.limits):
+        for point, end, limit in zip((found.lower, found.upper), found.ends, self.limits):
             if point is None and abs(end - limit) > 1e-6 * limit:
                 raise InputError(
                     f"The stable range ends near {end * 30 / np.pi:.0f} rpm of the cage and no bifurcation is found "
                     "there: it must have exact edges to be designed by them (`search` `surrogate` needs none)."
                 )
-        low, high = max(found.lower_speed, self.operating[0]), min(found.upper_speed, self.operating[1])
-        speed = (low + high) / 2 if low <= high else (found.lower_speed + found.upper_speed) / 2
+        (first, last), (low, high) = found.ends, self.operating
+        low, high = max(first, low), min(last, high)
+        speed = (low + high) / 2 if low <= high else (first + last) / 2
         edges = {"lower": found.lower, "upper": found.upper}
         return _Anchor(place.copy(), edges, found.state_at(speed) / self._scale(place, speed), speed)
 

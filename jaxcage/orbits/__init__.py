@@ -2,18 +2,16 @@
 
 | module            | responsibility                                                                      |
 |-------------------|-------------------------------------------------------------------------------------|
-| `problem`         | the equations of an orbit, their unknowns, and parameters by name                   |
-| `step_counts`     | how many steps a revolution takes                                                   |
+| `problem`         | the return map, its unknowns, and how many steps a revolution takes                 |
 | `newton`          | Newton's method for orbits, damped; derivatives by the implicit function theorem    |
 | `orbit`           | periodic orbits, their multipliers, and the determinant these must have             |
 | `point`           | bifurcation points: kinds, and matrices and functions that vanish there             |
-| `step_lengths`    | step control of continuation: predictions, accepted and refused steps               |
+| `step_control`    | step control of continuation: predictions, accepted and refused steps               |
 | `continuation`    | pseudo-arclength continuation, an iterator with corrector, step control and events  |
 | `location`        | bifurcations between orbits of a branch, compared with every change of stability    |
 | `branch`          | branches of orbits with their bifurcations; period-doubling cascades                |
 | `bifurcation`     | Newton's method for bifurcation points                                              |
-| `curves`          | curves of bifurcation points in two parameters                                      |
-| `following`       | edges followed from one design to another                                           |
+| `curves`          | curves of bifurcation points in two parameters; edges from one design to another    |
 | `search`          | search for orbits without a hint of where they are                                  |
 | `unstable_ranges` | unstable ranges of the synchronous orbit; mechanisms of chaotic edges               |
 | `gradient`        | derivatives and elasticities of edges, derivatives of orbits and multipliers        |
@@ -27,12 +25,16 @@ from .branch import (
     branch as branch,
     cascade as cascade,
 )
-from .curves import Curve as Curve, curve as curve
-from .following import Followed as Followed, follow as follow, follow_all as follow_all
+from .curves import (
+    Curve as Curve,
+    Followed as Followed,
+    curve as curve,
+    follow as follow,
+    follow_all as follow_all,
+)
 from .gradient import (
     OrbitSlopes as OrbitSlopes,
     Sensitivity as Sensitivity,
-    edge_speed as edge_speed,
     limit_sensitivity as limit_sensitivity,
     orbit_slopes as orbit_slopes,
     sensitivities as sensitivities,
@@ -40,23 +42,18 @@ from .gradient import (
     width as width,
 )
 from .orbit import (
-    Guess as Guess,
-    NearOrbit as NearOrbit,
     Orbit as Orbit,
-    PointGuess as PointGuess,
-    StateLike as StateLike,
     periodic_orbit as periodic_orbit,
 )
 from .point import Point as Point
 from .problem import pick as pick
 from .search import (
     StableRange as StableRange,
-    Stretch as Stretch,
     SynchronousOrbits as SynchronousOrbits,
     stable_range as stable_range,
     synchronous_orbits as synchronous_orbits,
 )
-from .step_lengths import StepControl as StepControl
+from .step_control import StepControl as StepControl
 from .unstable_ranges import (
     Explained as Explained,
     LossZones as LossZones,

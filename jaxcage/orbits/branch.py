@@ -13,7 +13,7 @@ from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
 from .._pytrees import Scalar
 from ..analysis import Edge
-from ..models import AbstractForcedSystem, require_speeds
+from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import AbstractMethod, Rodas4
 from .continuation import (
@@ -28,11 +28,10 @@ from .continuation import (
     orbit_curves,
 )
 from .location import Place, bifurcations_of
-from .orbit import NearOrbit, Orbit, guess_state
-from .point import CRITICAL, UNEXPLAINED, Outcome, Point, require_found, test_functions, value_at
-from .problem import SPEED, Given, Parameter, name_of
-from .step_counts import SETTLED
-from .step_lengths import Points, StepControl
+from .orbit import NearOrbit, Orbit
+from .point import CRITICAL, UNEXPLAINED, Outcome, Point, read_start, require_found, test_functions
+from .problem import SETTLED, SPEED, Given, Parameter, name_of
+from .step_control import Points, StepControl
 
 
 FEIGENBAUM = 4.669201609102990
@@ -109,24 +108,17 @@ def branch(
     """
     require_x64()
     require_at_least(1, periods=periods)
+    start = read_start("orbit", orbit, system, parameter, speed)
     if isinstance(orbit, Orbit | Point):
-        speed, periods = orbit.speed, int(orbit.periods)
-        state, at = orbit.state, value_at(orbit, system, speed, parameter)
-    else:
-        state, at = orbit
-    known_speed = at if parameter == SPEED else speed
-    if known_speed is None:
-        raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
-    require_speeds(system, known_speed)
-    given = Given(system, jnp.asarray(known_speed, dtype=float))
-    problem = orbit_curves(given, parameter, lower, upper, method, periods)
-    problem.require_inside("orbit", float(at))
+        periods = int(orbit.periods)
+    problem = orbit_curves(Given(system, start.speed), parameter, lower, upper, method, periods)
+    at = float(start.at)
+    problem.require_inside("orbit", at)
     if method is None and isinstance(orbit, Orbit) and isinstance(orbit.solver, Rodas4):
         problem = problem.by_rodas4()
-    state = guess_state(system, known_speed, state)
-    (found,) = follow_both_ways(problem, [(np.asarray(state), float(at))], steps)
+    (found,) = follow_both_ways(problem, [(np.asarray(start.state), at)], steps)
     if found is None:
-        raise ArgumentError("orbit", said=f"must be near a periodic orbit, but none is near it at {float(at):g}.")
+        raise ArgumentError("orbit", said=f"must be near a periodic orbit, but none is near it at {at:g}.")
     return found
 
 

@@ -24,9 +24,8 @@ from ..solve import AbstractMethod, cores
 from .newton import TOLERANCE, AbstractEquations, solve
 from .orbit import OrbitEquations
 from .point import eigenvalues
-from .problem import SPEED, Given, Parameter, make_problem
-from .step_counts import GIVEN_UP, SETTLED, Counts, by_rodas4, by_steps, counted
-from .step_lengths import Points, StepControl
+from .problem import GIVEN_UP, SETTLED, SPEED, Counts, Given, Parameter, by_rodas4, by_steps, counted, make_problem
+from .step_control import Points, StepControl
 
 
 CHUNK = 8  # points per call: up to eight cost what one does, since they share the processor's instructions
@@ -245,6 +244,17 @@ def first_points(
     return found
 
 
+def solved_again(
+    problem: ContinuationProblem, row: Points, which: np.ndarray, steps: np.ndarray, corrector: Callable = correct
+) -> Points:
+    """Return the points with some solved for once more by these steps, if that succeeds."""
+    if not which.size:
+        return row
+    got = corrector(problem, row.u[which], row.tangent[which], steps)
+    good = got.converged
+    return row.put(which[good], got.take(good).with_errors_of(row.take(which[good])))
+
+
 # --- iterator ------------------------------------------------------------------------------------------------------
 
 
@@ -329,7 +339,12 @@ class Continuation:
         active = [c for c in self.curves if not c.ended]
         if not active:
             raise StopIteration
-        self._solve_again([c for c in active if c.steps != c.points[-1].steps])
+        changed = [c for c in active if c.steps != c.points[-1].steps]
+        if changed:  # the last points are solved for again, by the steps that hold now
+            last, steps = Points.stacked([c.points[-1] for c in changed]), np.array([c.steps for c in changed])
+            last = solved_again(self.problem, last, np.arange(len(changed)), steps, self.corrector)
+            for i, c in enumerate(changed):
+                c.points[-1] = last.take(i)
         ahead, normal = (
             np.stack(x) for x in zip(*(self.control.predict(c.points, c.length) for c in active), strict=True)
         )
@@ -382,13 +397,3 @@ class Continuation:
         curve.length = control.after_success(length, step)
         curve.ended = next(filter(None, (event(curve) for event in self.events)), "")
         return True
-
-    def _solve_again(self, curves: list[Path]) -> None:
-        """Solve for the last points again, by the steps that hold now."""
-        if not curves:
-            return
-        last = Points.stacked([c.points[-1] for c in curves])
-        again = self.corrector(self.problem, last.u, last.tangent, np.array([c.steps for c in curves]))
-        for i, curve in enumerate(curves):
-            if again.converged[i]:
-                curve.points[-1] = again.take(i).with_errors_of(curve.points[-1])

@@ -1,25 +1,42 @@
-"""Bifurcation points followed in two parameters: the curves of a stability map."""
+"""Bifurcation points followed in two parameters: curves of a stability map, and edges from one design to another.
+
+From one design to another the two parameters are the speed and the share of the way on the straight line between the
+designs, so that an edge that turns back in the design is followed round the turn. The predictor has the full tangent of
+state, speed and share by the implicit function theorem, and so the orbit moves with its land.
+"""
 
 import dataclasses
 import itertools
-from typing import cast
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from .._arguments import require_x64
 from .._errors import ArgumentError
+from .._parameters import parameters
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import AbstractMethod
-from .bifurcation import PointEquations
+from .bifurcation import point_equations
 from .continuation import Continuation, ContinuationProblem, Path, first_points, in_parallel
-from .point import Kind, Point, null_vectors, require_found, singular_matrix
-from .problem import SPEED, Given, Parameter, make_problem, value_of
-from .step_counts import ENOUGH, by_steps, counted
-from .step_lengths import Points, StepControl
+from .gradient import Sensitivity, sensitivity
+from .point import Point, critical_of, require_found
+from .problem import ENOUGH, SPEED, Given, Parameter, counted, make_problem, value_of
+from .step_control import Points, StepControl
+
+
+SHARE = "share"
+LONGEST, SHORTEST, MOST = 1.5, 1e-6, 80
+"""Longest and shortest step, in clearances and tenths of the speed and of the largest relative change; most steps."""
+LEAST = 1e-10  # designs that differ by less are the same up to rounding
+SAME_EDGE = 2e-3
+"""Largest relative distance of the edge by its final equations from the end of its curve."""
+WALK = StepControl(first=0.05, longest=0.25, most=200)  # in units of 1/20 of the ranges and of the system's scale
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,7 +78,6 @@ def curve(
     x_lower: float,
     x_upper: float,
     name: str = "",
-    steps: StepControl = StepControl(first=0.05, longest=0.25, most=200),
     method: AbstractMethod | None = None,
 ) -> Curve:
     """Follow a bifurcation point both ways in two parameters.
@@ -72,7 +88,6 @@ def curve(
         `bifurcation`.
     - `x`, `y`: the two parameters, by name.
     - `lower`, `upper`, `x_lower`, `x_upper`: the range of `y` and of `x` [SI]; the curve ends where it leaves them.
-    - `steps`: step lengths, in units of 1/20 of the ranges and of the system's scale.
 
     **Raises:** `ValueError` if Newton's method does not find the point again, or for a kind that cannot be followed.
     """
@@ -89,12 +104,12 @@ def curve(
         raise ArgumentError("lower", "upper", said=said)
     low, high = np.array([x_lower, lower]), np.array([x_upper, upper])
     given = Given(system, jnp.asarray(point.speed, dtype=float))
-    problem, start = point_curve(given, (x, y), (high - low) / 20, (low, high), point, own, method)
+    problem, start = _point_curve(given, (x, y), (high - low) / 20, (low, high), point, own, method)
     problem.require_inside("point", float(point.value))
     if not bool(start.converged[0]):
         said = f"must be a {point.kind} of the system, but Newton's method finds none there."
         raise ArgumentError("point", said=said)
-    up, down = in_parallel(lambda sign: follow_curve(problem, start.turned(sign), steps), [1.0, -1.0])
+    up, down = in_parallel(lambda sign: _followed(problem, start.turned(sign), WALK), [1.0, -1.0])
     points = up.row.after(down.row)
     multipliers, values = problem.multipliers(points), problem.values(points.u)
     genuine = np.array([point.kind != "Neimark-Sacker" or _is_on_circle(mu) for mu in multipliers])
@@ -105,7 +120,7 @@ def curve(
     )
 
 
-def point_curve(
+def _point_curve(
     given: Given,
     parameters: tuple[Parameter, Parameter],
     units: Float[np.ndarray, " 2"],
@@ -123,19 +138,21 @@ def point_curve(
     count = int(point.steps) or min(int(counts.last), ENOUGH)
     z = jnp.asarray(np.asarray(point.state) / np.asarray(orbit.scale))
     there = jnp.append(z, jnp.asarray([float(point.value), second]) / orbit.units)
-    _, monodromy = orbit.returned(by_steps(orbit, count).prepare(there, given), z)
-    borders = null_vectors(singular_matrix(cast(Kind, point.kind), monodromy))
-    problem = ContinuationProblem(PointEquations(orbit, *borders, cast(Kind, point.kind)), given, counts, *limits)
+    equations = point_equations(orbit, critical_of(point.kind), there, given, count)
+    problem = ContinuationProblem(equations, given, counts, *limits)
     u = problem.unknowns(point.state, float(point.value), second)
     return problem, first_points(problem, u[None], np.eye(1, u.size, u.size - 1), count // 2)
 
 
-def follow_curve(problem: ContinuationProblem, start: Points, steps: StepControl) -> Path:
+def _followed(problem: ContinuationProblem, start: Points, steps: StepControl) -> Path:
     """Follow a curve of bifurcation points in the direction of its first tangent, until it leaves its limits."""
     walk = Continuation(problem, start, steps, oriented=False)
     for advanced in walk:
-        for one in advanced:
-            walk.problem = _with_fresh_borders(walk.problem, one)
+        for one in advanced:  # borders from the null vectors at the last point keep the equations far from singular
+            known = one.points[-1].aux
+            borders = tuple(v / np.linalg.norm(v) for v in (known.left, known.right))
+            place = lambda p: (p.equations.left, p.equations.right)
+            walk.problem = eqx.tree_at(place, walk.problem, borders)
     return walk.curves[0]
 
 
@@ -145,8 +162,106 @@ def _is_on_circle(multipliers: np.ndarray) -> bool:
     return bool(abs((one + other).real / 2) <= 1)
 
 
-def _with_fresh_borders(problem: ContinuationProblem, followed: Path) -> ContinuationProblem:
-    """Return the problem with borders from the null vectors at the last point, which keep it far from singular."""
-    known = followed.points[-1].aux
-    borders = tuple(v / np.linalg.norm(v) for v in (known.left, known.right))
-    return eqx.tree_at(lambda p: (p.equations.left, p.equations.right), problem, borders)
+# --- from one design to another -------------------------------------------------------------------------------------
+
+
+class Between(Given):
+    """A system on the straight line between two designs; the parameter `share` is 0 at the first and 1 at the other."""
+
+    other: AbstractForcedSystem
+
+    def changed(self, parameter: Parameter, new: Any) -> Given:
+        if parameter == SPEED:
+            return dataclasses.replace(self, speed=new)
+        mixed = jax.tree.map(lambda a, b: a + new * (b - a), self.system, self.other)
+        return Given(mixed, self.speed)
+
+
+class Followed(NamedTuple):
+    """An edge after a change of design, or why there is none.
+
+    - `edge`: the edge with its derivatives, None if it was lost.
+    - `ended`: empty; `turned back`, the edge met another one before the change was complete and both vanished;
+        `left the range` of speed; `neutral saddle`, the pair of multipliers of a Neimark-Sacker bifurcation is real
+        there, so that nothing bifurcates; `lost`, continuation found no further point.
+    - `share`: how far along the change the edge existed, 1 if it reached the new design.
+    """
+
+    edge: Sensitivity | None
+    ended: str = ""
+    share: float = 1.0
+
+
+def follow(
+    system: AbstractForcedSystem,
+    point: Point,
+    other: AbstractForcedSystem,
+    *,
+    lower: float,
+    upper: float,
+    name: str = "edge",
+    method: AbstractMethod | None = None,
+) -> Followed:
+    """Follow an edge from the design `system`, at which it is `point`, to the design `other`.
+
+    **Arguments:** design; a period doubling, Neimark-Sacker bifurcation or fold over speed that was found there; new
+    design, of the same kind of model; range of speed [rad/s] within which the edge is followed.
+
+    **Returns:** the edge at the new design with its exact derivatives, or why it is not there.
+    """
+    require_x64()
+    a, b = (np.array([float(x) for x in parameters(m).values()]) for m in (system, other))
+    size = np.maximum(np.abs(a), np.abs(b))
+    length = 10 * float(np.max(np.abs(b - a)[size > 0] / size[size > 0], initial=0.0))
+    if length < LEAST:
+        return _solved(other, point, name, method)
+    given = Between(system, jnp.asarray(point.speed, dtype=float), other)
+    units = np.array([0.1 * float(point.speed), 1 / length])
+    limits = np.array([lower, -1e-9]), np.array([upper, 1.0])
+    problem, start = _point_curve(given, (SPEED, SHARE), units, limits, point, 0.0, method)
+    if not bool(start.converged[0]):
+        return Followed(None, "lost", 0.0)
+    ahead = float(start.tangent[0, -1])
+    first = min(LONGEST, length / max(abs(ahead), 1e-3))
+    control = StepControl(first=first, longest=max(LONGEST, first), shortest=min(SHORTEST, first), most=MOST)
+    path = _followed(problem, start.turned(np.sign(ahead)), control)
+    row = path.row
+    share = row.u[:, -1] / length
+    if share[-1] >= 1:
+        return _solved(other, _landed(problem, row, share, point), name, method)
+    reach = float(np.max(share))
+    if row.tangent[-1, -1] < 0:
+        return Followed(None, "turned back", reach)
+    return Followed(None, "left the range" if path.ended == "range" else "lost", reach)
+
+
+def _landed(problem: ContinuationProblem, row: Points, share: np.ndarray, point: Point) -> Point:
+    """Return the point of a curve at the new design, by a cubic through its last two points and their tangents."""
+    (a, b), (sa, sb) = row.take(slice(-2, None)).u, share[-2:]
+    da, db = (t * (sb - sa) / (t[-1] * problem.units[1]) for t in row.tangent[-2:])
+    s = (1 - sa) / (sb - sa)
+    u = a + s * (b - a) + s * (1 - s) * ((1 - s) * (da - (b - a)) + s * ((b - a) - db))
+    speed = float(problem.values(u)[0])
+    return dataclasses.replace(point, speed=speed, value=speed, state=problem.states(u), steps=int(row.steps[-1]))
+
+
+def _solved(system: AbstractForcedSystem, point: Point, name: str, method: AbstractMethod | None) -> Followed:
+    """Return the edge by its equations at the new design alone."""
+    edge = sensitivity(system, point, name, method)
+    if edge.status == "other kind":
+        return Followed(None, "neutral saddle")
+    near = abs(edge.value_rpm - float(point.speed_rpm)) < SAME_EDGE * float(point.speed_rpm)
+    return Followed(edge) if np.isfinite(edge.value_rpm) and near else Followed(None, "lost")
+
+
+def follow_all(
+    system: AbstractForcedSystem,
+    points: Mapping[str, Point],
+    other: AbstractForcedSystem,
+    limits: tuple[float, float],
+    method: AbstractMethod | None = None,
+) -> dict[str, Followed]:
+    """Return what became of each edge at another design; edges run on all cores."""
+    lower, upper = limits
+    one = lambda name: follow(system, points[name], other, lower=lower, upper=upper, name=name, method=method)
+    return dict(zip(points, in_parallel(one, list(points)), strict=True)) if points else {}

@@ -5,14 +5,12 @@ exponents a_i of a unit in every parameter p_i
     sum a_i p_i dw/dp_i = 0 for mass and length, = -w for time.
 These hold for every kind of edge and test a gradient without any reference.
 
-With P(z, k) = z an orbit and M(z, k) its monodromy matrix, dz = -(M - 1)^-1 dP and dM = M_z dz + M_k dk; a simple
-multiplier mu with left and right vectors l, r moves by l dM r / l r. One expansion of the return map to second order
-gives all derivatives, for every kind of edge and for the largest multiplier of an orbit, by one compiled program.
+All derivatives follow from the equations of an edge or of an orbit by the implicit function theorem (`newton.as_root`).
 """
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast, get_args
 
 import equinox as eqx
 import jax
@@ -27,21 +25,16 @@ from .._pytrees import compiled
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import AbstractMethod
-from .bifurcation import ON_CIRCLE, TANGENTIAL, PointEquations, critical_rate
+from .bifurcation import PointEquations, Solved, solve_point
 from .branch import FEIGENBAUM, Cascade
 from .continuation import in_parallel
-from .newton import FieldNumbers, around_root, expansion, numbers_around, numbers_of
+from .newton import as_root
 from .orbit import Orbit, OrbitEquations, sorted_multipliers
-from .point import Kind, Point, eigenvalues, null_vectors, singular_matrix, to_critical
-from .problem import SPEED, Given, OrbitProblem, make_problem
-from .step_counts import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, with_fallback
+from .point import Kind, Point, Start
+from .problem import MOST_OF_A_POINT, SPEED, Counts, Given, make_problem, with_fallback
 
 
 PER_RPM = np.pi / 30
-ITERATIONS = 6
-POLISHED, SETTLED_TO, NEARBY = 1e-11, 1e-7, 0.5
-"""Limits of Newton's method, in units of the system's scale and of a tenth of the speed: it ends with a step below the
-first, the step must be below the second, and it may lead no further from the guess than the third."""
 OUTSIDE = 1e-6  # distance from the unit circle beyond which a multiplier is outside
 
 
@@ -93,117 +86,14 @@ class Sensitivity:
 
 
 @compiled
-def _pull_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -> AbstractForcedSystem:
-    """Return d(weight . k) / d system."""
-    row = lambda s: numbers_of(problem.prepare(u, Given(s, given.speed)))[0]
-    _, pull = eqx.filter_vjp(row, given.system)
-    return pull(weight)[0]
+def _pull_back(equations: PointEquations, given: Given, u: Array) -> AbstractForcedSystem:
+    """Return d speed / d system at a bifurcation over speed."""
 
+    def speed(system: AbstractForcedSystem) -> Array:
+        moved, _ = as_root(Given(system, given.speed), equations=equations, u=u)
+        return equations.problem.values(moved)[0]
 
-def _pulled_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -> dict[str, float]:
-    """Return d(weight . k) / d parameter [SI]."""
-    pulled = _pull_back(problem, given, u, weight)
-    return {n: float(get(pulled, path)) for n, path in parameter_paths(given.system).items()}
-
-
-class _Edge(NamedTuple):
-    """An edge located to rounding, by some number of steps: Newton's last step in the unknowns' units (`residual`), the
-    derivatives of the speed by the field's numbers (`weight`), the rate d|mu| / d speed (at a fold the drift along the
-    critical direction), and the distance of the speed to that by half the steps [rad/s] (`error`)."""
-
-    kind: Kind
-    problem: OrbitProblem
-    u: Array
-    residual: Array
-    weight: Array
-    rate: float
-    monodromy: Array
-    error: float = float("nan")
-    steps: int = 0
-
-    @property
-    def speed(self) -> float:
-        return float(self.problem.values(self.u)[0])
-
-    @property
-    def multipliers(self) -> Complex[np.ndarray, " dim"]:
-        return eigenvalues(np.asarray(self.monodromy))
-
-    @property
-    def found(self) -> bool:
-        return bool(jnp.max(jnp.abs(self.residual)) < SETTLED_TO)
-
-    @property
-    def status(self) -> str:
-        if not self.found:
-            return "no such point"
-        if not to_critical(self.kind, jnp.asarray(self.multipliers)) < ON_CIRCLE**0.5:
-            return "other kind"  # a neutral saddle
-        return "not converged" if self.error > SETTLED * self.speed else "converged"
-
-
-@compiled
-def _unfold(
-    kind: Kind, problem: OrbitProblem, u: Array, numbers: FieldNumbers, around: Any, slopes: Any
-) -> tuple[Array, Array, Array, Array]:
-    """Return Newton's step to the bifurcation near the unknowns u; weight, rate and monodromy there (see `_Edge`)."""
-    n, m, unit = problem.dimension, u.size, problem.units[0]
-    borders = null_vectors(singular_matrix(kind, around[1]))
-    equations = PointEquations(problem, *borders, kind)
-    (r, known), (of_r, _) = around_root(equations, u, numbers, around, slopes)
-    jacobian = of_r[:, :m] + of_r[:, m:] @ numbers.of_u
-    adjoint = jnp.linalg.solve(jacobian.T, jnp.zeros(m).at[-1].set(1.0))
-    rate = critical_rate(kind, n, jacobian, known, borders) / unit
-    return jnp.linalg.solve(jacobian, r), -(adjoint @ of_r[:, m:]) * unit, rate, known.monodromy
-
-
-def _located(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None) -> _Edge:
-    """Locate the edge near `point`, and again with twice the steps until it stays where it is."""
-
-    def find(chosen: AbstractMethod, counts: Counts) -> _Edge:
-        counts = counts.near(int(point.steps) or None)
-        given = Given(system, jnp.asarray(point.speed, dtype=float))
-        problem = make_problem(given, (SPEED,), [0.1 * given.speed], point.periods, chosen)
-        near = begin = jnp.append(jnp.asarray(point.state) / problem.scale, 10.0)
-        before, edge = None, None
-        for i in range(int(counts.tries)):
-            steps = int(counts.steps(i))
-            before, edge = edge, _polished(by_steps(problem, steps), given, point.kind, near)._replace(steps=steps)
-            if before is not None:
-                both = before.found and edge.found
-                edge = edge._replace(error=abs(edge.speed - before.speed) if both else float("inf"))
-            known = edge.found or (before is not None and before.found)
-            if edge.error <= POINT * edge.speed * float(counts.tolerance) or (steps >= GIVEN_UP and not known):
-                break
-            near = edge.u if edge.found else begin
-        assert edge is not None
-        return edge
-
-    return with_fallback(find, method, MOST_OF_A_POINT)
-
-
-def _polished(problem: OrbitProblem, given: Given, kind: Any, first: Array) -> _Edge:
-    """Locate the edge near the unknowns `first` by Newton's method, with the steps of the problem."""
-    u, orbit = first, OrbitEquations(problem)
-    left = ITERATIONS
-    while True:
-        numbers = numbers_around(orbit, u, given)
-        step, weight, rate, monodromy = _unfold(kind, problem, u, numbers, *expansion(problem, u, numbers))
-        leads = jnp.max(jnp.abs(u - step - first))
-        goes_on = (jnp.max(jnp.abs(step)) > POLISHED) & (leads < NEARBY)  # not if it is there, lost, or not a number
-        if not (left and bool(goes_on)):
-            return _Edge(kind, problem, u, step, weight, float(rate), monodromy)
-        u, left = u - step, left - 1
-
-
-def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None = None) -> float:
-    """Return the speed [rad/s] of the edge near `point`; NaN if it is not found, or elsewhere by half the steps."""
-    require_x64()
-    if point.kind == "branch-point":
-        said = "must be a period-doubling, Neimark-Sacker or fold, but it is a branch-point."
-        raise ArgumentError("point", said=said)
-    edge = _located(system, point, method)
-    return edge.speed if edge.status == "converged" else float("nan")
+    return eqx.filter_grad(speed)(given.system)
 
 
 def sensitivity(
@@ -220,28 +110,38 @@ def sensitivity(
     finds a neutral saddle instead of a Neimark-Sacker bifurcation, or finds it elsewhere with half the steps.
     """
     require_x64()
-    if point.kind == "branch-point":  # it is there for the symmetry alone, and no function of the design
+    if point.kind not in get_args(
+        Kind
+    ):  # a branch point is there for the symmetry alone, and no function of the design
         return _nowhere(system, point.kind, name)
-    edge = _located(system, point, method)
-    if edge.status != "converged":
-        return _nowhere(system, point.kind, name, edge.status, edge.error / PER_RPM)
-    speed = edge.speed
-    slope = _pulled_back(edge.problem, Given(system, jnp.asarray(point.speed, dtype=float)), edge.u, edge.weight)
+    given = Given(system, jnp.asarray(point.speed, dtype=float))
+    begin = Start(jnp.asarray(point.state), given.speed, given.speed)
+
+    def find(method: AbstractMethod, counts: Counts) -> Solved:
+        near = counts.near(int(point.steps) or None)
+        return solve_point(given, cast(Kind, point.kind), SPEED, point.periods, begin, method, near)
+
+    solves = lambda found: np.isfinite(found[0].residual)
+    edge, equations, u = with_fallback(find, method, solves, MOST_OF_A_POINT)
+    if not bool(edge.converged):
+        return _nowhere(system, point.kind, name, edge.status, float(edge.error_rpm))
+    pulled, speed = _pull_back(equations, given, u), float(edge.speed)
+    slope = {n: float(get(pulled, path)) for n, path in parameter_paths(system).items()}
     change = {n: slope[n] * float(v) / speed for n, v in parameters(system).items()}
     units, bases = parameter_dimensions(system), {"mass": 0.0, "length": 0.0, "time": 1.0}
     return Sensitivity(
         name=name,
         kind=point.kind,
-        value_rpm=speed / PER_RPM,
+        value_rpm=float(edge.speed_rpm),
         derivative={n: s / PER_RPM for n, s in slope.items()},
         elasticity=change,
         homogeneity={b: rate + sum(units[n][b] * e for n, e in change.items()) for b, rate in bases.items()},
-        transversality=edge.rate,
-        status="tangential" if abs(edge.rate * speed) < TANGENTIAL else "converged",
-        state=np.asarray(edge.problem.state(edge.u)),
-        error_rpm=edge.error / PER_RPM,
-        steps=edge.steps,
-        multipliers=edge.multipliers,
+        transversality=float(edge.transversality),
+        status=edge.status,
+        state=np.asarray(edge.state),
+        error_rpm=float(edge.error_rpm),
+        steps=int(edge.steps),
+        multipliers=np.asarray(edge.multipliers),
     )
 
 
@@ -310,21 +210,20 @@ class OrbitSlopes(NamedTuple):
 
 
 @compiled
-def _numbers_by(
-    problem: OrbitProblem, u: Array, speed: Array, designs: Callable[[Array], AbstractForcedSystem], at: Array
-) -> Array:
-    """Return the derivatives of the field's numbers by the design variables."""
-    return jax.jacfwd(lambda x: numbers_of(problem.prepare(u, Given(designs(x), speed)))[0])(at)
+def _moves(
+    equations: OrbitEquations, orbit: Orbit, designs: Callable[[Array], AbstractForcedSystem], place: Array
+) -> tuple[Array, tuple[Array, Array]]:
+    """Return |mu| of the largest multiplier, and its derivatives and those of the state by the design variables."""
+    problem = equations.problem
 
+    def orbit_of(place: Array) -> tuple[tuple[Array, Array], Array]:
+        given, u = Given(designs(place), orbit.speed), orbit.state / problem.scale
+        u, monodromy = as_root(given, equations=equations, u=u)
+        size = jnp.abs(sorted_multipliers(monodromy)[0])
+        return (size, problem.state(u)), size
 
-@compiled
-def _orbit_moves(monodromy: Array, of_r: Array, of_monodromy: Array, by_design: Array) -> tuple[Array, Array, Array]:
-    """Return |mu| of the largest multiplier, its derivatives, and those of the unknowns, by the design variables."""
-    n = monodromy.shape[0]
-    size, weight = jax.value_and_grad(lambda m: jnp.abs(sorted_multipliers(m)[0]))(monodromy)
-    moved = -jnp.linalg.solve(of_r[:, :n], of_r[:, n:])
-    of_numbers = jnp.einsum("ij,ijk->k", weight, of_monodromy[..., n:] + of_monodromy[..., :n] @ moved)
-    return size, of_numbers @ by_design, moved @ by_design
+    slopes, size = jax.jacfwd(orbit_of, has_aux=True)(place)
+    return size, slopes
 
 
 def orbit_slopes(
@@ -338,10 +237,5 @@ def orbit_slopes(
     place = jnp.asarray(at, dtype=float)
     given = Given(designs(place), jnp.asarray(orbit.speed, dtype=float))
     problem = make_problem(given, (), jnp.ones(0), orbit.periods, orbit.method)
-    equations, u = OrbitEquations(problem), orbit.state / problem.scale
-    numbers = numbers_around(equations, u, given)
-    (_, monodromy), slopes = around_root(equations, u, numbers, *expansion(problem, u, numbers))
-    by_design = _numbers_by(problem, u, given.speed, designs, place)
-    size, multiplier, unknowns = _orbit_moves(monodromy, *slopes, by_design)
-    state = np.asarray(problem.scale)[:, None] * np.asarray(unknowns)
-    return OrbitSlopes(float(size), np.asarray(multiplier), state)
+    size, (multiplier, state) = _moves(OrbitEquations(problem), orbit, designs, place)
+    return OrbitSlopes(float(size), np.asarray(multiplier), np.asarray(state))

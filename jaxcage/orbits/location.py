@@ -13,10 +13,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from .continuation import ContinuationProblem, correct
-from .point import COMPLEX, UNEXPLAINED, test_functions, to_critical
-from .step_counts import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
-from .step_lengths import Points
+from .continuation import ContinuationProblem, correct, solved_again
+from .point import COMPLEX, UNEXPLAINED, critical_of, test_functions, to_critical
+from .problem import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
+from .step_control import Points
 
 
 WIDER = (0, 1, 3)  # a bifurcation that is not where it was seen is looked for this many orbits further out
@@ -67,7 +67,9 @@ def bifurcations_of(problem: ContinuationProblem, rows: Sequence[Points]) -> lis
     within a step, the step is halved. If it changes otherwise than by what was located, its orbits are solved for again
     and bifurcations located once more. The rest is of the kind `unexplained`: the curve may not be a branch there.
     """
-    rows = [_halved(problem, _at_the_root(problem, row)) for row in rows]
+    steep = [np.flatnonzero(np.max(np.abs(row.jacobian), axis=(1, 2)) > STEEP) for row in rows]
+    at_root = [solved_again(problem, row, k, row.steps[k]) for row, k in zip(rows, steep, strict=True)]
+    rows = [_halved(problem, row) for row in at_root]
     places = _located(problem, rows)
     gaps = lambda i: _gaps(problem, rows[i], [(p.after, p.kind) for p in places[i]])
     doubtful = [i for i in range(len(rows)) if gaps(i)]
@@ -89,28 +91,13 @@ def bifurcations_of(problem: ContinuationProblem, rows: Sequence[Points]) -> lis
 # --- orbits of a branch --------------------------------------------------------------------------------------------
 
 
-def _at_the_root(problem: ContinuationProblem, row: Points) -> Points:
-    """Return the orbits with derivatives at the root where those of Newton's last iterate before it may differ."""
-    steep = np.flatnonzero(np.max(np.abs(row.jacobian), axis=(1, 2)) > STEEP)
-    return _solved_again(problem, row, steep, row.steps[steep])
-
-
 def _with_finer_steps(problem: ContinuationProblem, row: Points, gaps: Sequence[tuple[int, int]]) -> Points:
     """Return the orbits with those around the gaps solved for again, in each gap by twice the largest steps."""
     for a, b in gaps:
         near = np.arange(max(a - 1, 0), min(b + 2, len(row.u)))
         steps = np.full(near.size, min(2 * int(row.steps[near].max()), int(problem.counts.last)))
-        row = _solved_again(problem, row, near, steps)
+        row = solved_again(problem, row, near, steps)
     return row
-
-
-def _solved_again(problem: ContinuationProblem, row: Points, which: np.ndarray, steps: np.ndarray) -> Points:
-    """Return the orbits with some solved for once more by these steps, if that succeeds."""
-    if not which.size:
-        return row
-    got = correct(problem, row.u[which], row.tangent[which], steps)
-    good = got.converged
-    return row.put(which[good], got.take(good).with_errors_of(row.take(which[good])))
 
 
 def _with_middles(
@@ -236,8 +223,10 @@ def _located(problem: ContinuationProblem, rows: Sequence[Points]) -> list[list[
     _locate(problem, [p for mine in places for p in mine])
 
     def is_there(p: Place) -> bool:
+        if p.point is None:
+            return False
         near = 1e-4 if p.kind == "Neimark-Sacker" else 1e-3  # a double multiplier is known to the root of rounding
-        return p.point is not None and bool(to_critical(p.kind, jnp.asarray(problem.multipliers(p.point))) < near)
+        return bool(to_critical(critical_of(p.kind), jnp.asarray(problem.multipliers(p.point))) < near)
 
     return [[p for p in mine if is_there(p)] for mine in places]
 
@@ -253,14 +242,10 @@ def _locate(problem: ContinuationProblem, places: Sequence[Place]) -> None:
     for p in places:
         p.steps = int(p.row.steps[p.after : p.after + 2].max()) if chooses else int(counts.first)
         p.moved = BESIDE / 2 * float(np.linalg.norm(p.row.u[p.after + 1] - p.row.u[p.after]))
-        p.error = float("inf") if most > 1 else float("nan")
-    for p, point in zip(places, _found_at(problem, places), strict=True):
-        p.point = point
     settled = lambda p: p.point is not None and p.error <= POINT * max(abs(p.point.u[-1]), 1.0) * chooses
-    while again := [p for p in places if not settled(p) and p.steps < most]:
-        for p in again:
-            p.steps = min(2 * p.steps, most)
-        for p, point in zip(again, _found_at(problem, again), strict=True):
+    waiting = list(places)
+    while waiting:
+        for p, point in zip(waiting, _found_at(problem, waiting), strict=True):
             before = p.point
             if point is not None:
                 p.point = point
@@ -269,7 +254,10 @@ def _locate(problem: ContinuationProblem, places: Sequence[Place]) -> None:
                 p.moved = max(float(np.linalg.norm(point.u - before.u)), LOCATED)
                 p.within = max(PART * p.moved, LOCATED)
             elif point is not None or p.kind != "branch-point":
-                p.error = float("inf")
+                p.error = float("inf") if most > 1 else float("nan")
+        waiting = [p for p in waiting if not settled(p) and p.steps < most]
+        for p in waiting:
+            p.steps = min(2 * p.steps, most)
     there = [p for p in places if chooses and p.point is not None]
     for p in there:
         p.steps = other_steps(p.steps)

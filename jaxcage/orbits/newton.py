@@ -4,16 +4,14 @@ Orbits of stiff systems with contact have small basins, which a full Newton step
 Deuflhard's natural monotonicity test holds, |J^-1 f(new)| < |J^-1 f(old)| with the old Jacobian, which does not depend
 on how the equations are scaled (P. Deuflhard, Newton Methods for Nonlinear Problems, 2004, sec. 3.3).
 
-Roots have derivatives by the implicit function theorem, and not through the iterations. The equations are
-R(u, k, P, M) = 0 in the unknowns u, with the numbers k(u, given) of the field and image and derivative P, M of the
-return map at (u, k). With R_x for all that follows from x,
-    (R_u + R_k k_u) du = -R_k k_given dgiven.
-One program for equations of every kind expands the map around (u, k) (`by_columns`); the number of design parameters
-behind the few numbers k does not matter. Since the tangent is a matrix times dgiven, reverse mode transposes that
-matrix and does not run revolutions backwards. The rule itself is differentiable, which gives second derivatives.
+Roots have derivatives of any order by the implicit function theorem (`jax.lax.custom_root`), and not through the
+iterations. The equations see the system only through the few numbers of its field, so that the number of design
+parameters behind these does not matter. The return map is expanded in state and numbers (`by_columns`): reverse mode
+transposes its Jacobian matrix and does not run revolutions backwards.
 """
 
 import abc
+import dataclasses
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
@@ -21,30 +19,24 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jax.core import Tracer
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
 from .._pytrees import Scalar, compiled
 from ..solve import StrobeMap
-from .problem import OrbitProblem, Prepared, frozen
-from .step_counts import GIVEN_UP, Counts, by_steps
+from .problem import GIVEN_UP, Counts, OrbitProblem, by_steps, frozen
 
 
 class AbstractEquations(eqx.Module):
-    """Equations in an orbit's state and further unknowns, split into a cheap part and the revolutions."""
+    """Equations in an orbit's state and further unknowns."""
 
     problem: eqx.AbstractVar[OrbitProblem]
 
     @abc.abstractmethod
-    def prepare(self, u: Float[Array, " n"], given: Any) -> Prepared:
-        """Return all that the revolutions need to know of the unknowns and of what is given."""
-
-    @abc.abstractmethod
     def closing(
-        self, u: Float[Array, " n"], prepared: Prepared, image: Float[Array, " dim"], columns: Float[Array, "dim c"]
+        self, u: Float[Array, " n"], image: Float[Array, " dim"], monodromy: Float[Array, "dim dim"]
     ) -> tuple[Float[Array, " n"], Any]:
-        """Return the equations and what else is wanted at the root, from the return map and its derivatives."""
+        """Return the equations and what else is wanted at the root, from the return map and its derivative."""
 
     @abc.abstractmethod
     def monodromy(self, found: Any) -> Any:
@@ -62,9 +54,8 @@ class AbstractEquations(eqx.Module):
         """Return the equations, their derivative along each unknown, and what else is wanted at the root."""
 
         def at(u: Array) -> tuple[Array, tuple[Array, Any]]:
-            strobe, drifts = prepared = self.prepare(u, given)
-            image, columns = self.problem.returned(strobe, u[: self.problem.dimension], drifts)
-            r, aux = self.closing(u, prepared, image, columns)
+            problem = self.problem
+            r, aux = self.closing(u, *problem.returned(problem.prepare(u, given), u[: problem.dimension]))
             return r, (r, aux)
 
         jacobian, (r, aux) = jax.jacfwd(at, has_aux=True)(u)
@@ -91,7 +82,6 @@ class Found(eqx.Module):
     """
 
     converged: Bool[Array, ""]
-    iterations: Int[Array, ""]
     newton: Newton
     aux: Any
     steps: Int[Array, ""]
@@ -152,16 +142,16 @@ def solve(
     aux = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), like)
     start = jnp.zeros((), int), guess, begin, ~jnp.all(jnp.isfinite(guess)), aux
     goes_on = lambda carry: (carry[0] < max_steps) & ~carry[2].done & ~carry[3]
-    i, u, newton, lost, aux = jax.lax.while_loop(goes_on, iteration, start)
-    return u, Found(newton.done & ~lost, i, newton, aux, jnp.zeros((), int), jnp.asarray(jnp.nan))
+    _, u, newton, lost, aux = jax.lax.while_loop(goes_on, iteration, start)
+    return u, Found(newton.done & ~lost, newton, aux, jnp.zeros((), int), jnp.asarray(jnp.nan))
 
 
 def refined(
-    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
+    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], counts: Counts
 ) -> tuple[Float[Array, " n"], Found]:
     """Find a root with as many steps as it needs: solve again with twice as many until it stays where it is."""
     once = lambda steps, u, skip: solve(
-        partial(by_steps(equations, steps).linearised, given=given), u, at_root=at_root, skip=skip
+        partial(by_steps(equations, steps).linearised, given=given), u, at_root=True, skip=skip
     )
 
     def doubling(carry: tuple) -> tuple:
@@ -187,105 +177,40 @@ def refined(
 # --- derivatives ---------------------------------------------------------------------------------------------------
 
 
-def as_root(given: Any, *, equations: AbstractEquations, u: Float[Array, " n"], aux: Any) -> tuple[Array, Any]:
+@compiled
+def as_root(given: Any, *, equations: AbstractEquations, u: Float[Array, " n"]) -> tuple[Array, Any]:
     """Return u and what else is known at it, as functions of what is given: u is a root of the equations there."""
-    # `jax.grad` of a Python number traces a number that is no array, and that a filter of arrays would not see
-    given = jax.tree.map(lambda x: jnp.asarray(x) if isinstance(x, Tracer) else x, given)
-    return _as_root(given, equations=equations, u=u, aux=aux)
+    problem, start = equations.problem, frozen(u)
+
+    def closing(u: Array) -> tuple[Array, Any]:
+        strobe = problem.prepare(u, given)
+        x = jnp.concatenate([u[: problem.dimension], numbers_of(strobe)[0]])
+        return equations.closing(u, *by_columns(x, Push(frozen(strobe), problem)))
+
+    matrix = lambda linear, y: jnp.linalg.solve(jax.jacfwd(linear)(jnp.zeros_like(y)), y)
+    root = jax.lax.custom_root(lambda u: closing(u)[0], start, lambda _, u: u, matrix)
+    return root, closing(root)[1]
 
 
-@eqx.filter_custom_jvp
-def _as_root(given: Any, *, equations: AbstractEquations, u: Array, aux: Any) -> tuple[Array, Any]:
-    return u, aux
+def numbers_of(strobe: StrobeMap) -> tuple[Float[Array, " k"], Callable[[Array], StrobeMap]]:
+    """Return the numbers of a map's field in a row, and the function that puts a row back into the map.
 
-
-@_as_root.def_jvp
-def _as_root_jvp(primals: Any, tangents: Any, *, equations: AbstractEquations, u: Array, aux: Any) -> Any:
-    (given,), (given_dot,) = primals, tangents
-    u, aux = _as_root(given, equations=equations, u=u, aux=aux)
-    numbers, moving = eqx.filter_jvp(lambda g: numbers_around(equations, u, g), (given,), (given_dot,))
-    around, slopes = expansion(equations.problem, u, numbers)
-    _, slopes = around_root(equations, u, numbers, around, slopes)
-    return (u, aux), _root_tangent(numbers, *slopes, moving.k)
-
-
-class FieldNumbers(NamedTuple):
-    """The numbers of the field at a root, or their tangents."""
-
-    k: Float[Array, " k"]
-    of_u: Float[Array, "k n"]
-    """Derivatives of k with respect to the unknowns."""
-    like: Prepared
-    """The tree that the numbers k belong to."""
-
-
-@compiled
-def numbers_around(equations: AbstractEquations, u: Array, given: Any) -> FieldNumbers:
-    """Return the numbers of the field at the unknowns u, and their derivatives with respect to u."""
-    row = lambda v: numbers_of(equations.prepare(v, given))[0]
-    return FieldNumbers(row(u), jax.jacfwd(row)(u), equations.prepare(u, given))
-
-
-def expansion(problem: OrbitProblem, u: Float[Array, " n"], numbers: FieldNumbers) -> tuple[Any, Any]:
-    """Return image of the state and its derivatives, and the slopes of both by the state and the field's numbers."""
-    x = jnp.concatenate([u[: problem.dimension], numbers.k])
-    return by_columns(x, f=Slopes(Push(frozen(numbers.like), problem)))
-
-
-@compiled
-def around_root(
-    equations: AbstractEquations, u: Array, numbers: FieldNumbers, around: Any, slopes: Any
-) -> tuple[tuple[Array, Any], tuple[Array, Any]]:
-    """Return the equations and what else is known at u, and the derivatives of both by u and, then, by k."""
-    n, m, remake = equations.problem.dimension, u.size, numbers_of(numbers.like)[1]
-
-    def closing(moved: Array) -> tuple[Any, Any]:
-        """Return the equations, with the map linear from here."""
-        y = jnp.concatenate([u, numbers.k]) + moved
-        off = jnp.concatenate([moved[:n], moved[m:]])
-        found = equations.closing(y[:m], remake(y[m:]), *jax.tree.map(lambda p, s: p + s @ off, around, slopes))
-        return found, found
-
-    slopes_there, there = jax.jacfwd(closing, has_aux=True)(jnp.zeros(m + numbers.k.size))
-    return there, slopes_there
-
-
-@compiled
-def _root_tangent(numbers: FieldNumbers, of_r: Array, of_aux: Any, k_dot: Array) -> tuple[Array, Any]:
-    """Return the derivatives of a root, and of what else is known there, along `k_dot`."""
-    m = of_r.shape[0]
-    u_dot = -jnp.linalg.solve(of_r[:, :m] + of_r[:, m:] @ numbers.of_u, of_r[:, m:] @ k_dot)
-    moved = jnp.concatenate([u_dot, k_dot + numbers.of_u @ u_dot])
-    return u_dot, jax.tree.map(lambda d: d @ moved, of_aux)
-
-
-def numbers_of(prepared: Any) -> tuple[Float[Array, " k"], Callable[[Array], Any]]:
-    """Return all numbers that the results of `prepared` depend on, in a row, and the function that puts a row back.
-
-    For a strobe map these are the field's numbers: system and scale only say how far out a state is and how large an
-    error.
+    The system and its scale are left out: they only say how far out a state is and how large an error.
     """
-    is_map = lambda node: isinstance(node, StrobeMap)
-    matters = lambda node: (
-        eqx.tree_at(lambda m: m.field, jax.tree.map(lambda _: False, node), eqx.is_inexact_array)
-        if is_map(node)
-        else eqx.is_inexact_array(node)
-    )
-    numbers, rest = eqx.partition(prepared, jax.tree.map(matters, prepared, is_leaf=is_map))
+    numbers, rest = eqx.partition(strobe.field, eqx.is_inexact_array)
     k, unravel = ravel_pytree(numbers)
-    return k, lambda row: eqx.combine(unravel(row), rest)
+    return k, lambda row: dataclasses.replace(strobe, field=eqx.combine(unravel(row), rest))
 
 
 class Push(eqx.Module):
     """Image of a state and its derivatives, as a function of state and numbers of the field in a row."""
 
-    like: Prepared
+    strobe: StrobeMap
     problem: OrbitProblem
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
         n = self.problem.dimension
-        strobe, drifts = numbers_of(self.like)[1](x[n:])
-        return self.problem.returned(strobe, x[:n], drifts)
+        return self.problem.returned(numbers_of(self.strobe)[1](x[n:]), x[:n])
 
 
 class Slopes(eqx.Module):
@@ -298,22 +223,20 @@ class Slopes(eqx.Module):
         return value, slopes
 
 
-@eqx.filter_custom_jvp
-def by_columns(x: Float[Array, " n"], *, f: Callable[[Array], Any]) -> Any:
+def by_columns(x: Float[Array, " n"], f: Callable[[Array], Any]) -> Any:
     """Return f(x), which reverse mode, too, differentiates by f's Jacobian matrix in forward mode, to any order.
 
     `f` is a module; its own numbers have no derivative.
     """
-    return _evaluated(f, x)
+    numbers, rest = eqx.partition(f, eqx.is_array)
 
+    @jax.custom_jvp
+    def value(numbers: Any, x: Array) -> Any:
+        return eqx.combine(numbers, rest)(x)
 
-@by_columns.def_jvp
-def _by_columns_jvp(primals: Any, tangents: Any, *, f: Callable[[Array], Any]) -> Any:
-    (x,), (x_dot,) = primals, tangents
-    value, slopes = by_columns(x, f=Slopes(f))
-    return value, jax.tree.map(lambda s: s @ x_dot, slopes)
+    @value.defjvp
+    def _(primals: Any, tangents: Any) -> Any:
+        result, slopes = by_columns(primals[1], Slopes(eqx.combine(primals[0], rest)))
+        return result, jax.tree.map(lambda s: s @ tangents[1], slopes)
 
-
-@compiled
-def _evaluated(f: Callable[[Array], Any], x: Array) -> Any:
-    return f(x)
+    return value(numbers, x)

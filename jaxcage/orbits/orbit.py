@@ -17,15 +17,28 @@ from ..models import AbstractForcedSystem, require_speeds
 from ..quantities import notebook_html
 from ..solve import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, strobe_map
 from .newton import AbstractEquations, as_root, refined
-from .problem import Given, OrbitProblem, Prepared, frozen, is_traced, make_problem
-from .step_counts import ENOUGH, IMAGE, SETTLED, SLOPE, Counts, by_steps, with_fallback
+from .problem import (
+    ENOUGH,
+    IMAGE,
+    SETTLED,
+    SLOPE,
+    Counts,
+    Given,
+    OrbitProblem,
+    by_steps,
+    frozen,
+    is_traced,
+    make_problem,
+    with_fallback,
+)
 
 
 if TYPE_CHECKING:
     from .point import Point
 
 ROUNDING = 1e-13
-AT_REST = 1e-3  # a simulation has led to an orbit if it moves by less, in units of the system's scale
+SPUN = 200  # revolutions of the simulation that leads to an orbit
+AT_REST = 1e-3  # a simulation has led to one if it moves by less, in units of the system's scale
 LIOUVILLE_TOLERANCE = 1e-3  # largest disagreement in log|det M| at which multipliers are trusted
 ADAPTIVE_PARTS, MOST_PARTS = 256, 4096
 """Parts of a revolution for integrating the divergence: with a method that has no steps, and with steps that are a
@@ -37,11 +50,8 @@ class OrbitEquations(AbstractEquations):
 
     problem: OrbitProblem
 
-    def prepare(self, u: Array, given: Given) -> Prepared:
-        return self.problem.prepare(u, given), []
-
-    def closing(self, u: Array, prepared: Prepared, image: Array, columns: Array) -> tuple[Array, Array]:
-        return image - u[: self.problem.dimension], columns
+    def closing(self, u: Array, image: Array, monodromy: Array) -> tuple[Array, Array]:
+        return image - u[: self.problem.dimension], monodromy
 
     def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Any]:
         """Run one revolution with the state's tangents and a column for each other unknown, in one kernel."""
@@ -85,7 +95,6 @@ class Orbit(eqx.Module):
     steps: Int[Array, ""]
     error: Float[Array, ""]
     converged: Bool[Array, ""]
-    iterations: Int[Array, ""]
     periods: Int[Array, ""]
     solver: dfx.AbstractSolver | AbstractMethod = eqx.field(static=True)
 
@@ -93,11 +102,6 @@ class Orbit(eqx.Module):
     def method(self) -> AbstractMethod:
         """Integration method, with its steps."""
         return self.solver if isinstance(self.solver, AbstractMethod) else FixedSteps(self.solver, self.steps)
-
-    @property
-    def period(self) -> Array:
-        """Duration [s]."""
-        return 2 * jnp.pi * self.periods.astype(float) / self.speed
 
     @property
     def stable(self) -> Bool[Array, ""]:
@@ -129,15 +133,11 @@ class Orbit(eqx.Module):
 
 if TYPE_CHECKING:
     StateLike: TypeAlias = State | Float[Array, " dim"] | Float[np.ndarray, " dim"]
-    """A state [SI]."""
     Guess: TypeAlias = StateLike | Orbit
-    """A state near an orbit, or an orbit."""
     NearOrbit: TypeAlias = Orbit | Point | tuple[StateLike, Scalar]
-    """An orbit, a bifurcation of one, or a state near one with the value of the parameter."""
     PointGuess: TypeAlias = Scalar | NearOrbit
-    """A value of the parameter, or something near the bifurcation."""
 else:  # the functions check these arguments themselves
-    StateLike = Guess = NearOrbit = PointGuess = object
+    Guess = NearOrbit = PointGuess = object
 
 
 @jax.custom_jvp
@@ -182,19 +182,16 @@ def divergence_integral(
     return total * h
 
 
-def simulated(
-    problem: OrbitProblem, given: Given, start: Array, revolutions: Any, counts: Counts
+def _simulated(
+    problem: OrbitProblem, given: Given, start: Array, revolutions: Array, counts: Counts
 ) -> Float[Array, " dim"]:
     """Return the state after `revolutions` from `start`, and as many with twice the steps until it is at rest."""
-    given = frozen(given)
-    counts = counts._replace(last=jnp.minimum(counts.last, ENOUGH))
 
     def turn(i: Array, carry: tuple) -> tuple:
         y, done = carry
         strobe = strobe_map(given.system, given.speed, by_steps(problem, counts.steps(i)).method)
         begin = jnp.where(jnp.all(jnp.isfinite(y)), y, start)
-        row = tuple(begin[k] for k in range(start.size))
-        spin = jnp.where(done, 0, revolutions)
+        row, spin = tuple(begin[k] for k in range(start.size)), jnp.where(done, 0, revolutions)
         z = jnp.stack(jax.lax.fori_loop(0, spin, lambda _, y: strobe(y).y, row))
         return z, done | (jnp.max(jnp.abs(z - y) / problem.scale) < AT_REST * counts.tolerance)
 
@@ -207,9 +204,9 @@ def _find(
 ) -> tuple[Orbit, OrbitEquations, Array]:
     """Find the orbit, without derivatives; return its equations and unknowns, too."""
     if revolutions is not None:
-        guess = simulated(problem, given, guess, revolutions, spinning)
+        guess = _simulated(problem, given, guess, revolutions, spinning)
     equations = OrbitEquations(problem)
-    u, found = refined(equations, given, guess / problem.scale, counts, at_root=True)
+    u, found = refined(equations, given, guess / problem.scale, counts)
     converged = found.converged & ~((counts.tolerance > 0) & (found.error > SETTLED))
     u, equations = jnp.where(converged, u, jnp.nan), by_steps(equations, found.steps)
     n, at_root = problem.dimension, found.newton  # image and derivative of the map are those of the last evaluation
@@ -229,7 +226,6 @@ def _find(
         steps=found.steps,
         error=found.error,
         converged=converged,
-        iterations=found.iterations,
         periods=problem.periods,
         solver=problem.method.solver if isinstance(problem.method, FixedSteps) else problem.method,
     )
@@ -276,7 +272,7 @@ def periodic_orbit(
     start = guess_state(system, given.speed, guess)
     once = revolutions is not None  # no more revolutions than asked for
     if revolutions is None and guess is None:
-        revolutions = 200
+        revolutions = SPUN
     spin = None if revolutions is None else jnp.asarray(revolutions)
 
     def find(method: AbstractMethod, counts: Counts) -> Orbit:
@@ -284,15 +280,15 @@ def periodic_orbit(
         problem = make_problem(here, (), jnp.ones(0), periods, method)
         counts = counts.near(guess.steps if isinstance(guess, Orbit) else None)
         enough = jnp.minimum(counts.last, ENOUGH)
-        spinning = counts._replace(first=enough if once else jnp.minimum(counts.first * 2, enough), last=enough)
-        found, equations, u = _find(problem, counts, spinning, here, begin, spin)
+        first = enough if once else jnp.minimum(counts.first * 2, enough)
+        found, equations, u = _find(problem, counts, counts._replace(first=first, last=enough), here, begin, spin)
         if not is_traced(given):
             return found
-        u, monodromy = as_root(given, equations=equations, u=u, aux=found.monodromy)
+        u, monodromy = as_root(given, equations=equations, u=u)
         state, multipliers = _place(equations, u, monodromy)
         return dataclasses.replace(found, state=state, speed=given.speed, multipliers=multipliers, monodromy=monodromy)
 
-    return with_fallback(find, method, serves=lambda found: found.converged)
+    return with_fallback(find, method, lambda found: found.converged)
 
 
 def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Guess | None) -> Float[Array, " dim"]:

@@ -10,26 +10,27 @@ The determinants are symmetric functions of all multipliers: nothing jumps when 
 """
 
 import enum
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
 
+from .._arguments import shown, wrong
 from .._errors import ArgumentError
 from .._pytrees import Scalar
 from ..analysis import Edge
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, require_speeds
 from ..quantities import notebook_html
-from .problem import SPEED, Parameter, value_of
+from .orbit import Orbit, guess_state
+from .problem import SPEED, Parameter, frozen, is_traced, value_of
 
 
-Kind = Literal["period-doubling", "Neimark-Sacker", "fold", "branch-point"]
+Kind = Literal["period-doubling", "Neimark-Sacker", "fold"]
+"""Kinds that Newton's method solves for; a branch has branch points, too."""
 CRITICAL = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}
 """The critical multiplier of each kind that has a real one."""
-
-
 COMPLEX = 1e-5
 """Least imaginary part of a complex multiplier: a double real one has the root of rounding."""
 
@@ -40,12 +41,17 @@ def _second_compound(m: Float[Array, "n n"]) -> Float[Array, "k k"]:
     return m[np.ix_(i, i)] * m[np.ix_(j, j)] - m[np.ix_(i, j)] * m[np.ix_(j, i)]
 
 
-def singular_matrix(kind: Kind, m: Float[Array, "n n"]) -> Float[Array, "k k"]:
-    """Return the matrix that is singular at a bifurcation of `kind` of an orbit with monodromy matrix `m`."""
-    if kind == "Neimark-Sacker":
+def critical_of(kind: str) -> Float[Array, ""] | None:
+    """Return the critical multiplier of a kind; None where it is a complex pair."""
+    return jnp.asarray(CRITICAL[kind]) if kind in CRITICAL else None
+
+
+def singular_matrix(critical: Float[Array, ""] | None, m: Float[Array, "n n"]) -> Float[Array, "k k"]:
+    """Return the matrix that is singular at a bifurcation of an orbit with monodromy matrix `m`."""
+    if critical is None:
         c = _second_compound(m)
         return c - np.eye(c.shape[0])
-    return m - CRITICAL[kind] * np.eye(m.shape[0])
+    return m - critical * np.eye(m.shape[0])
 
 
 def null_vectors(a: Float[Array, "k k"]) -> tuple[Float[Array, " k"], Float[Array, " k"]]:
@@ -84,14 +90,14 @@ def test_functions(multipliers: Complex[np.ndarray, "*points n"]) -> dict[str, F
     }
 
 
-def to_critical(kind: str, multipliers: Complex[Array, " n"]) -> Float[Array, ""]:
-    """Return the distance of the nearest multiplier from where a bifurcation of `kind` has one.
+def to_critical(critical: Float[Array, ""] | None, multipliers: Complex[Array, " n"]) -> Float[Array, ""]:
+    """Return the distance of the nearest multiplier from the critical one or, without one, of a pair from the circle.
 
-    For a Neimark-Sacker bifurcation only complex multipliers count: a real pair whose product is 1 is a neutral saddle.
+    Only complex multipliers count as a pair: a real one whose product is 1 is a neutral saddle.
     """
-    if kind == "Neimark-Sacker":
+    if critical is None:
         return jnp.min(jnp.where(jnp.abs(multipliers.imag) > COMPLEX, jnp.abs(jnp.abs(multipliers) - 1), jnp.inf))
-    return jnp.min(jnp.abs(multipliers - CRITICAL[kind]))
+    return jnp.min(jnp.abs(multipliers - critical))
 
 
 def eigenvalues(monodromy: np.ndarray) -> np.ndarray:
@@ -151,7 +157,6 @@ class Point(eqx.Module):
     residual: Scalar = float("nan")
     transversality: Scalar = float("nan")
     outcome: Int[Array, ""] | int = Outcome.GIVEN.value
-    iterations: Int[Array, ""] | int = 0
     index: int = eqx.field(static=True, default=-1)
     edge: bool = eqx.field(static=True, default=False)
     looked: str = eqx.field(static=True, default="")
@@ -227,8 +232,39 @@ def require_found(point: Point, name: str = "point") -> None:
         raise ArgumentError(name, said=f"must be one that was found, but this {point.kind} was not.")
 
 
-def value_at(orbit: Any, system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> Array:
-    """Return the system's value of a parameter or, for a bifurcation in this parameter, the value found there."""
-    if isinstance(orbit, Point) and orbit.parameter == parameter:
-        return jnp.asarray(orbit.value, dtype=float)
-    return value_of(system, speed, parameter)
+class Start(NamedTuple):
+    """A state [SI] near an orbit, its speed [rad/s], and the value of the free parameter [SI]."""
+
+    state: Any
+    speed: Any
+    at: Any
+
+
+def read_start(
+    name: str, guess: Any, system: AbstractForcedSystem, parameter: Parameter, speed: Scalar | None
+) -> Start:
+    """Return state, speed and value of an orbit, a point, a pair (state, value), or a value, without derivatives.
+
+    A value alone comes with the first of the system's initial states.
+
+    **Raises:** `ArgumentError`, for the argument called `name`, if it is none of these or has no speed.
+    """
+    at: Any
+    if isinstance(guess, Orbit | Point):
+        state, speed = guess.state, guess.speed
+        at = value_of(system, speed, parameter)
+        if isinstance(guess, Point) and not is_traced(guess):
+            require_found(guess, name)
+        if isinstance(guess, Point) and guess.parameter == parameter:
+            at = guess.value
+    else:
+        state, at = guess if isinstance(guess, tuple) and len(guess) == 2 else (None, guess)
+    if wrong(Scalar, at):
+        said = "must be a number, a state and a number, an `Orbit` or a `Point`"
+        raise ArgumentError(name, said=f"{said}, but {shown(guess)} was given.")
+    speed = at if parameter == SPEED else speed
+    if speed is None:
+        raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
+    require_speeds(system, speed)
+    state = guess_state(system, speed, state)
+    return Start(state, jnp.asarray(speed, dtype=float), frozen(jnp.asarray(at, dtype=float)))

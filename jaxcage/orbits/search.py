@@ -7,6 +7,7 @@ bifurcations; between them are the unstable ranges of the synchronous orbit.
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -23,7 +24,7 @@ from .branch import Branch, follow_both_ways
 from .continuation import ContinuationProblem, orbit_curves
 from .point import Point
 from .problem import SPEED, Given
-from .step_lengths import StepControl
+from .step_control import StepControl
 
 
 ROUND, ROUNDS = 4, 8  # branches followed at a time, and how often
@@ -33,17 +34,21 @@ PATIENCE_OUT = 3  # the same where only the stable orbits on both sides are want
 OUTWARD = StepControl(first=0.05, longest=0.5, most=400)  # steps along the orbits of a stable range
 ON_BRANCH = 0.03  # largest distance of an orbit on a branch from the branch, in units of the system's scale
 NEARLY = 0.1  # a simulation that moves by less in its last revolution, in units of the scale, approaches an orbit
+SHORT: dict[str, Any] = {"revolutions": 8, "blocks": 1, "keep": 8, "exponents": 0}
+"""Settings of the simulations, which only lead to orbits."""
 Progress = Callable[[str, int, int], None]
 Scale = Callable[[float], np.ndarray]
 """Units of the state at a speed [rad/s]."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Stretch:
-    """A stable part of a branch of synchronous orbits, with its ends, None if the range or the branch ends there.
+class StableRange:
+    """A stable part of a branch of synchronous orbits: a range of speed in which a machine may run.
 
-    Branches that are parts of one have the same `family`. `met` simulations settled on the stretch, `met_first` of them
-    from the system's conventional start, the first of its initial states.
+    `lower` and `upper` are the bifurcations at its ends, None if the range searched or the branch ends there. `states`
+    are the orbits along it at `speeds` [rad/s], both ascending. Branches that are parts of one have the same `family`.
+    `met` simulations settled on it, `met_first` of them from the system's conventional start, the first of its initial
+    states.
     """
 
     lower: Point | None
@@ -54,11 +59,18 @@ class Stretch:
     family: int = 0
     met: int = 0
     met_first: int = 0
+    speeds: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
+    states: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def width_rpm(self) -> float:
         """Range of speed [rpm]."""
         return self.upper_rpm - self.lower_rpm
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest speed [rad/s]."""
+        return self.lower_rpm * np.pi / 30, self.upper_rpm * np.pi / 30
 
     @property
     def error_rpm(self) -> float:
@@ -69,6 +81,15 @@ class Stretch:
     def confirmed(self) -> bool:
         """Whether both ends are located to less than its width."""
         return not self.error_rpm > self.width_rpm
+
+    def state_at(self, speed: float) -> np.ndarray:
+        """Return the state of the orbit at a speed [rad/s] within the range, by linear interpolation."""
+        return np.array([np.interp(speed, self.speeds, c) for c in self.states.T])
+
+    def holds(self, speed: float, state: np.ndarray, scale: np.ndarray) -> bool:
+        """Return whether the orbit `state` at `speed` lies on it, to the accuracy of the steps of a continuation."""
+        inside = self.lower_rpm <= speed * 30 / np.pi <= self.upper_rpm
+        return inside and bool(np.max(np.abs(self.state_at(speed) - state) / scale) < ON_BRANCH)
 
     def __str__(self) -> str:
         end = lambda p, rpm: f"{rpm:.1f} ({'range' if p is None else p.kind})"
@@ -86,7 +107,7 @@ class SynchronousOrbits:
     """
 
     branches: tuple[Branch, ...]
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[StableRange, ...]
     sweep: xr.Dataset
     missed: int
     lower_rpm: float
@@ -158,7 +179,6 @@ def synchronous_orbits(
     *,
     count: int = 251,
     discard: int = 250,
-    steps: StepControl = StepControl(most=1500),
     settled: xr.Dataset | None = None,
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
@@ -166,8 +186,8 @@ def synchronous_orbits(
     """Find and follow the synchronous orbits between two speeds [rad/s].
 
     **Arguments:** system and range; number of speeds that are simulated from each of the system's initial states, and
-    revolutions left out; steps of the continuation, in units of 1/20 of the range; a sweep that was made before,
-    instead of simulations. Simulations from the opposites of the initial states serve only to find orbits.
+    revolutions left out; a sweep that was made before, instead of simulations. Simulations from the opposites of the
+    initial states serve only to find orbits.
 
     **Returns:** `SynchronousOrbits`. Simulations may miss stable orbits with a small basin.
     """
@@ -176,9 +196,8 @@ def synchronous_orbits(
     scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
 
     def simulate(speeds: np.ndarray, sign: float) -> xr.Dataset:
-        short: dict[str, Any] = {"discard": discard, "revolutions": 8, "blocks": 1, "keep": 8, "exponents": 0}
         starts, told = sign * initial_states(system, speeds, None), lambda done, of: say("simulations", done, of)
-        return sweep(system, speeds, starts=starts, **short, method=method, progress=told)
+        return sweep(system, speeds, starts=starts, discard=discard, **SHORT, method=method, progress=told)
 
     settled = simulate(np.linspace(lower, upper, count), 1.0) if settled is None else settled
     speeds = settled["speed"].values
@@ -196,15 +215,14 @@ def synchronous_orbits(
         say("branches", turn, ROUNDS)
         picked = np.unique(np.linspace(0, len(waiting) - 1, min(ROUND, len(waiting))).round().astype(int))
         starts = [(waiting[i].state, waiting[i].speed) for i in picked]
-        branches += [b for b in follow_both_ways(problem, starts, steps, PATIENCE) if b is not None]
+        branches += [b for b in follow_both_ways(problem, starts, StepControl(most=1500), PATIENCE) if b is not None]
         waiting = [w for w in waiting if not any(_covers(b, w.speed, w.state, scale) for b in branches)]
     say("branches", ROUNDS, ROUNDS)
-    limits = lower * 30 / np.pi, upper * 30 / np.pi
-    families, stretches = _families(branches, scale), []
-    for piece in _merged([p for i, b in enumerate(branches) for p in _pieces(b, i, limits)], scale):
-        met = [o.start for o in orbits if o.settled and piece.holds(o.speed * 30 / np.pi, o.state, scale(o.speed))]
-        known = {"family": families[piece.stretch.branch], "met": len(met), "met_first": met.count(0)}
-        stretches.append(dataclasses.replace(piece.stretch, **known))
+    families, stretches, limits = _families(branches, scale), [], (lower * 30 / np.pi, upper * 30 / np.pi)
+    for part in _merged([p for i, b in enumerate(branches) for p in _stable_parts(b, i, limits)], scale):
+        met = [o.start for o in orbits if o.settled and part.holds(o.speed, o.state, scale(o.speed))]
+        known = {"family": families[part.branch], "met": len(met), "met_first": met.count(0)}
+        stretches.append(dataclasses.replace(part, **known))
     return SynchronousOrbits(tuple(branches), tuple(stretches), settled, len(waiting), *limits)
 
 
@@ -260,82 +278,43 @@ def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
     return family
 
 
-# --- stable stretches ----------------------------------------------------------------------------------------------
+# --- stable ranges --------------------------------------------------------------------------------------------------
 
 
-class _Piece(NamedTuple):
-    """A stable part of one branch, its points by rising speed."""
-
-    stretch: Stretch
-    rpm: np.ndarray
-    state: np.ndarray
-
-    def state_at(self, rpm: float) -> np.ndarray:
-        return np.array([np.interp(rpm, self.rpm, c) for c in self.state.T])
-
-    def holds(self, rpm: float, state: np.ndarray, scale: np.ndarray) -> bool:
-        """Return whether the orbit `state` at `rpm` lies on this piece."""
-        inside = self.stretch.lower_rpm <= rpm <= self.stretch.upper_rpm
-        return inside and bool(np.max(np.abs(self.state_at(rpm) - state) / scale) < ON_BRANCH)
-
-
-def _pieces(branch: Branch, number: int, limits: tuple[float, float]) -> list[_Piece]:
+def _stable_parts(branch: Branch, number: int, limits: tuple[float, float]) -> list[StableRange]:
     """Return the stable parts of a branch over speed, cut to the limits [rpm]."""
     found = []
     edges = {p.index: p for p in branch.special if p.edge and p.status == "converged"}
     bounds = [-1, *np.flatnonzero(np.diff(branch.stable.astype(int))).tolist(), branch.value.size - 1]
-    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+    for first, last in itertools.pairwise(bounds):
         if last <= first or not branch.stable[last]:
             continue
-        points = [edges.get(first), edges.get(last)]
-        rpm, state = branch.speed_rpm[first + 1 : last + 1], branch.state[first + 1 : last + 1]
-        if rpm[0] > rpm[-1]:
-            points, rpm, state = points[::-1], rpm[::-1], state[::-1]
-        low, high = (float(r if p is None else p.speed_rpm) for p, r in zip(points, (rpm[0], rpm[-1]), strict=True))
-        stretch = Stretch(points[0], points[1], max(low, limits[0]), min(high, limits[1]), number)
-        found.append(_Piece(stretch, rpm, state))
+        along, points = np.arange(first + 1, last + 1), [edges.get(first), edges.get(last)]
+        if branch.speed[along[0]] > branch.speed[along[-1]]:
+            along, points = along[::-1], points[::-1]
+        ends = zip(points, branch.speed_rpm[along[[0, -1]]], strict=True)
+        low, high = (float(rpm if p is None else p.speed_rpm) for p, rpm in ends)
+        part = StableRange(points[0], points[1], max(low, limits[0]), min(high, limits[1]), number)
+        found.append(dataclasses.replace(part, speeds=branch.speed[along], states=branch.state[along]))
     return found
 
 
-def _merged(pieces: Sequence[_Piece], scale: Scale) -> list[_Piece]:
-    """Return the pieces with those joined that two branches from different starts share."""
-    whole: list[_Piece] = []
-    for piece in sorted(pieces, key=lambda p: p.stretch.lower_rpm):
-        for i, other in enumerate(whole):
-            a, b = other.stretch, piece.stretch
+def _merged(parts: Sequence[StableRange], scale: Scale) -> list[StableRange]:
+    """Return the parts with those joined that two branches from different starts share."""
+    whole: list[StableRange] = []
+    for b in sorted(parts, key=lambda p: p.lower_rpm):
+        for i, a in enumerate(whole):
             rpm = (b.lower_rpm + min(a.upper_rpm, b.upper_rpm)) / 2
-            if b.lower_rpm <= rpm and other.holds(rpm, piece.state_at(rpm), scale(rpm * np.pi / 30)):
-                beyond, top = piece.rpm > other.rpm[-1], b if b.upper_rpm > a.upper_rpm else a
-                joined = dataclasses.replace(a, upper=top.upper, upper_rpm=top.upper_rpm)
-                both = (np.concatenate([x, y[beyond]]) for x, y in zip(other[1:], piece[1:], strict=True))
-                whole[i] = _Piece(joined, *both)
+            speed = rpm * np.pi / 30
+            if b.lower_rpm <= rpm and a.holds(speed, b.state_at(speed), scale(speed)):
+                beyond, top = b.speeds > a.speeds[-1], b if b.upper_rpm > a.upper_rpm else a
+                speeds, states = np.append(a.speeds, b.speeds[beyond]), np.vstack([a.states, b.states[beyond]])
+                ends = {"upper": top.upper, "upper_rpm": top.upper_rpm}
+                whole[i] = dataclasses.replace(a, speeds=speeds, states=states, **ends)
                 break
         else:
-            whole.append(piece)
+            whole.append(b)
     return whole
-
-
-# --- one stable range -----------------------------------------------------------------------------------------------
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class StableRange:
-    """The range of speed in which a machine may run: a stable stretch of a branch of synchronous orbits.
-
-    `lower` and `upper` are the bifurcations that bound it, None where it reaches the limits of the search, and
-    `lower_speed` and `upper_speed` [rad/s] its ends. `states` are the orbits along it at `speeds`, both ascending.
-    """
-
-    lower: Point | None
-    upper: Point | None
-    lower_speed: float
-    upper_speed: float
-    speeds: np.ndarray
-    states: np.ndarray
-
-    def state_at(self, speed: float) -> np.ndarray:
-        """Return the state of the orbit at a speed [rad/s] within the range, by linear interpolation."""
-        return np.array([np.interp(speed, self.speeds, c) for c in self.states.T])
 
 
 def stable_range(
@@ -360,22 +339,20 @@ def stable_range(
     if near:
         waiting = [_Settled(np.asarray(state), float(speed), 0, True) for state, speed in near]
     else:
-        short: dict[str, Any] = {"discard": 250, "revolutions": 8, "blocks": 1, "keep": 8, "exponents": 0}
-        settled = sweep(system, np.linspace(*operating, 5), **short, method=method)
+        settled = sweep(system, np.linspace(*operating, 5), discard=250, **SHORT, method=method)
         waiting = _stable_orbits(problem, settled, scale)
-    pieces: list[_Piece] = []
+    parts: list[StableRange] = []
     for _ in range(TRIES):
         if not waiting:
             break
         picked = waiting[len(waiting) // 2]
         (found,) = follow_both_ways(problem, [(picked.state, picked.speed)], OUTWARD, PATIENCE_OUT)
         waiting = [w for w in waiting if w is not picked and not (found and _covers(found, w.speed, w.state, scale))]
-        pieces += _pieces(found, 0, (limits[0] * 30 / np.pi, limits[1] * 30 / np.pi)) if found else []
+        parts += _stable_parts(found, 0, (limits[0] * 30 / np.pi, limits[1] * 30 / np.pi)) if found else []
     low, high = (end * 30 / np.pi for end in operating)
-    overlap = lambda p: min(p.stretch.upper_rpm, high) - max(p.stretch.lower_rpm, low)
-    best = max(_merged(pieces, scale), key=overlap, default=None)
+    overlap = lambda part: min(part.upper_rpm, high) - max(part.lower_rpm, low)
+    best = max(_merged(parts, scale), key=overlap, default=None)
     if best is None or overlap(best) < 0:
         return None
-    s, rise = best.stretch, np.argsort(best.rpm)
-    ends = s.lower_rpm * np.pi / 30, s.upper_rpm * np.pi / 30
-    return StableRange(s.lower, s.upper, *ends, best.rpm[rise] * np.pi / 30, best.state[rise])
+    rise = np.argsort(best.speeds)
+    return dataclasses.replace(best, speeds=best.speeds[rise], states=best.states[rise])

@@ -14,6 +14,7 @@ Edges of chaotic zones, which are statistical, are compared with bifurcations an
 
 import dataclasses
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from ..quantities import notebook_html
 from ..solve import AbstractMethod
 from .branch import Cascade, cascade
 from .point import Point
-from .search import Stretch, SynchronousOrbits
+from .search import StableRange, SynchronousOrbits
 
 
 CASCADE_REACH_RPM = 500.0
@@ -43,7 +44,7 @@ class LossZones:
     zones: tuple[Zone, ...]
     edges: dict[str, Point]
     coexisting: dict[str, list[tuple[int, bool, np.ndarray, np.ndarray]]]
-    principal: Stretch | None
+    principal: StableRange | None
     close_below_rpm: float
 
     def __str__(self) -> str:
@@ -56,27 +57,25 @@ class LossZones:
     _repr_html_ = notebook_html
 
 
-@dataclasses.dataclass(frozen=True)
-class _Group:
-    """Stretches that count as one."""
+class _Group(NamedTuple):
+    """Stretches that count as one: the one that begins lowest, the one that ends highest, and all of them."""
 
-    stretches: tuple[Stretch, ...]
-
-    @property
-    def low(self) -> Stretch:
-        return min(self.stretches, key=lambda s: s.lower_rpm)
+    low: StableRange
+    high: StableRange
+    stretches: tuple[StableRange, ...]
 
     @property
-    def high(self) -> Stretch:
-        return max(self.stretches, key=lambda s: s.upper_rpm)
+    def width(self) -> float:
+        return self.high.upper_rpm - self.low.lower_rpm
 
     def apart(self, other: "_Group") -> float:
         """Return the width of the gap between two groups [rpm], negative if they overlap."""
         return max(other.low.lower_rpm - self.high.upper_rpm, self.low.lower_rpm - other.high.upper_rpm)
 
-    @property
-    def width(self) -> float:
-        return self.high.upper_rpm - self.low.lower_rpm
+
+def _group(*stretches: StableRange) -> _Group:
+    low, high = min(stretches, key=lambda s: s.lower_rpm), max(stretches, key=lambda s: s.upper_rpm)
+    return _Group(low, high, stretches)
 
 
 def _joined(groups: Sequence[_Group], close: float) -> list[_Group]:
@@ -88,7 +87,7 @@ def _joined(groups: Sequence[_Group], close: float) -> list[_Group]:
         if not closed:
             return groups
         _, a, b = min(closed, key=lambda pair: pair[0])
-        groups = [g for g in groups if g is not a and g is not b] + [_Group((*a.stretches, *b.stretches))]
+        groups = [g for g in groups if g is not a and g is not b] + [_group(*a.stretches, *b.stretches)]
 
 
 def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -> LossZones:
@@ -101,9 +100,9 @@ def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -
     if not found.stretches:
         return LossZones((), {}, {}, None, close_below_rpm)
     principal = max(found.stretches, key=lambda s: (s.met_first, s.met, s.width_rpm))
-    own = _joined([_Group((s,)) for s in found.stretches if s.family == principal.family], close_below_rpm)
+    own = _joined([_group(s) for s in found.stretches if s.family == principal.family], close_below_rpm)
     first = next(g for g in own if principal in g.stretches)
-    others = [_Group((s,)) for s in found.stretches if first.apart(_Group((s,))) >= 0]
+    others = [_group(s) for s in found.stretches if first.apart(_group(s)) >= 0]
     groups = _joined([first, *others], close_below_rpm)
     groups = [g for g in groups if principal in g.stretches or g.width >= close_below_rpm]
     groups.sort(key=lambda g: g.low.lower_rpm)

@@ -9,7 +9,7 @@ import numpy as np
 from .. import analysis
 from ..analysis import Zone, Zones, lives_in_words
 from ..bearing import PublishedCase
-from ..orbits import LossZones, Point, Stretch, SynchronousOrbits
+from ..orbits import LossZones, Point, StableRange, SynchronousOrbits
 from .tables import Beside, Column, Table, chosen, number, rows_table, speed_columns
 
 
@@ -154,7 +154,7 @@ def point_record(point: Point, found: SynchronousOrbits, name: str | None = None
     }
 
 
-def _stretch_record(stretch: Stretch, found: SynchronousOrbits) -> dict[str, Any]:
+def _stretch_record(stretch: StableRange, found: SynchronousOrbits) -> dict[str, Any]:
     """A stable stretch, which begins and ends by a kind of bifurcation, by `range` where it runs past the range, or by
     `unknown` where the branch was not followed further."""
     record = chosen(stretch, "lower_rpm upper_rpm width_rpm branch confirmed family met met_first")
