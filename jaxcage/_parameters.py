@@ -45,6 +45,8 @@ class ParameterInfo:
     lower: float
     upper: float
     text: str
+    kind: Kind = "fixed"
+    """Who knows it."""
     source: str = ""
     """Where its value comes from, or what to measure."""
 
@@ -89,7 +91,7 @@ def parameter(
     """
     if unit != UNKNOWN:
         unit_dimensions(unit)
-    info = ParameterInfo(unit, lower, upper, text, source or SOURCES[kind])
+    info = ParameterInfo(unit, lower, upper, text, kind, source or SOURCES[kind])
     return eqx.field(converter=functools.partial(_leaf_of, info), metadata={"parameter": info}, **kwargs)
 
 
