@@ -15,7 +15,7 @@ from report_example import RATIO, findings, swept
 import jaxcage as jc
 from jaxcage.analysis import Edge, Zone, Zones
 from jaxcage.show import Findings, Operating, page, read_operating
-from jaxcage.show.findings import chaotic_verdict, loss_verdict
+from jaxcage.show.operating import chaotic_verdict, loss_verdict
 from jaxcage.show.report import calmest
 
 

@@ -25,34 +25,17 @@ from ..design import Ensemble
 from .chance_tables import chances_answer, chances_notes, chances_tables, operating_chances
 from .design_figures import chance_of_chaos, elasticity_bars, statistic_bars
 from .diagrams import SWEPT, add_shaft_axes, mark_operating, reported, sweep_figure, zone_strip
-from .findings import (
-    CLOSE,
-    Findings,
-    OneSpeed,
-    Operating,
-    Orbits,
-    Verdict,
-    chaotic_verdict,
-    loss_verdict,
-    motion_verdict,
-)
-from .gradient_tables import elasticities_table, mean_gradient_tables, residual_words, to_be_turned
+from .findings import Findings, OneSpeed, Orbits
 from .maps import stability_map
+from .operating import CLOSE
 from .orbit_figures import multiplier_circle, orbit_diagram_with_branches
+from .parameter_tables import readings_words, shown, sources_table
 from .quantity_tables import quantities_table, run_tables, statics_table
 from .run_figures import load_bars, rollers_of, run_figure
-from .sources import readings_words, shown, sources_table
+from .slope_tables import elasticities_table, mean_gradient_tables, residual_words, to_be_turned
 from .style import drawn
-from .tables import Beside, Column, Table, counted, rows_table
-from .zone_tables import (
-    coexisting_notes,
-    edge_table,
-    loss_table,
-    stretches_table,
-    transient_tables,
-    zone_span,
-    zones_table,
-)
+from .tables import Column, Table, counted, table as table_of
+from .zone_tables import coexisting_notes, edge_table, loss_table, motion_tables, zone_span
 
 
 RASTER_DPI = 150
@@ -75,7 +58,6 @@ class Section:
     """Figures by name, each with its caption."""
     tables: Sequence[Table] = ()
     notes: Sequence[str] = ()
-    key_figures: Sequence[tuple[str, str]] = ()
 
 
 def page(
@@ -93,7 +75,6 @@ def page(
     those of the template, by dotted name.
     """
     model, rpm = findings.model, findings.sweep["rpm"].values
-    own = model.speed_text.split()[0]
     what = f"Case {findings.name}" if findings.published is not None else findings.name
     about = "where the cage moves chaotically" if findings.orbits is not None else "slip, forces and wear"
     quick = ", quick report: no gradients, a coarser sweep" if findings.quick else ""
@@ -105,10 +86,10 @@ def page(
     )
     return environment.get_template("page.html.j2").render(
         title=f"{what}: {about}",
-        subtitle=f"Cylindrical roller bearing, {rpm[0]:.0f} to {rpm[-1]:.0f} rpm of the {own}{quick}",
+        subtitle=f"Cylindrical roller bearing, {rpm[0]:.0f} to {rpm[-1]:.0f} rpm of the {model.speed_text.split()[0]}"
+        + quick,
         sections=_sections(findings, table, chances, left),
         picture=lambda figure: _picture(add_shaft_axes(figure, findings.sweep)),
-        words=lambda table: [all(v is None or isinstance(v, str) for v in c.values) for c in table.columns],
         version=__version__,
         command=command,
         date=datetime.date.today().isoformat(),
@@ -129,21 +110,23 @@ def _picture(figure: Figure) -> tuple[str, int, int]:
 def _sections(
     findings: Findings, table: Mapping[str, Any] | None, chances: Ensemble | None, left: Sequence[str]
 ) -> list[Section]:
-    orbits, one, statics = findings.orbits, findings.one_speed, findings.statics
+    model, orbits, statics = findings.model, findings.orbits, findings.statics
     sections = [_result(findings, chances, left)]
     if findings.operating:
         sections.append(Section("operating", "Operating speeds", tables=[verdict_table(findings)]))
-    sections += [_known(findings, chances)] if chances is not None else []
-    sections += [_motion(findings)] if orbits is None else [_zones(findings, orbits), _synchronous(findings, orbits)]
-    sections += [] if orbits is None else [_map(findings, orbits)]
-    sections += [_gradients(findings, orbits)] if orbits is not None and orbits.slopes else []
-    sections += _one_speed(findings, one) if one is not None else []
+    if chances is not None:
+        sections.append(_known(findings, chances))
+    sections.append(_zones(findings))
+    if orbits is not None:
+        sections += [_synchronous(findings, orbits), _map(findings, orbits)]
+        sections += [_gradients(findings, orbits)] if orbits.slopes else []
+    if findings.one_speed is not None:
+        sections += _one_speed(findings, findings.one_speed)
     if statics is not None:
-        said = f"under {float(findings.model.load):g} N"
+        said = f"under {float(model.load):g} N"
         figure = drawn(lambda ax: load_bars(statics, ax), 7.0, 3.2), f"Load of every roller at rest {said}."
-        rows = statics_table(f"At rest {said}", findings.model, statics)
+        rows = statics_table(f"At rest {said}", model, statics)
         sections.append(Section("statics", "Statics", (), {"statics": figure}, [rows]))
-    model = findings.model
     doubts = [*design_rule_violations(model.bearing, model.guidance_gap), *model.lubricant.doubts()]
     warnings = [f"Warning: {doubt}" for doubt in doubts]
     return [
@@ -154,49 +137,17 @@ def _sections(
     ]
 
 
-def _beside(findings: Findings) -> Beside:
-    """The shaft speed, if the model's is that of the cage, and its ratio to it."""
-    found = findings.sweep
-    return ("shaft", float(found["shaft_rpm"][-1] / found["rpm"][-1])) if "shaft_rpm" in found.coords else None
-
-
-def _both(findings: Findings, at: Operating) -> str:
-    other = _beside(findings)
-    return str(at) if other is None else f"{at} (shaft {at.of_shaft(1 / other[1])})"
-
-
-def assess(findings: Findings) -> list[tuple[Operating, dict[str, Verdict]]]:
-    """Each operating speed with the verdicts on it by kind of zone."""
-    return [(at, _verdicts(findings, at)) for at in findings.operating]
-
-
-def _verdicts(findings: Findings, at: Operating) -> dict[str, Verdict]:
-    orbits, found = findings.orbits, findings.zones
-    if orbits is None or not isinstance(found, Zones):
-        assert not isinstance(found, Zones)
-        return {"motion": motion_verdict(at, found, findings.sweep)}
-    searched = orbits.found.lower_rpm, orbits.found.upper_rpm
-    return {
-        "synchronous-loss": loss_verdict(at, orbits.loss.zones, *searched, bool(orbits.found.stretches)),
-        "chaotic": chaotic_verdict(at, found, findings.sweep),
-    }
-
-
 def verdict_table(findings: Findings) -> Table:
     """Operating speeds with the verdicts on them."""
     rows = [
-        vars(v) | {"speed": _both(findings, at), "kind": kind, "verdict": v.state}
-        for at, verdicts in assess(findings)
+        vars(v) | {"speed": findings.words(at), "kind": kind, "verdict": v.state}
+        for at, verdicts in findings.assessed
         for kind, v in verdicts.items()
     ]
-    columns = [
-        *(Column(head, ()) for head in ("speed", "kind", "verdict", "where")),
-        Column("nearest edge", (), key="edge"),
-        Column("away [rpm]", (), key="distance_rpm", digits=0),
-        Column("away [%]", (), key="percent", digits=1),
-    ]
+    away = [Column("away [rpm]", "distance_rpm", digits=0), Column("away [%]", "percent", digits=1)]
     close = f"close: an edge within {100 * CLOSE:g} % of the speed or within its own uncertainty"
-    return rows_table(f"Operating speeds of {findings.name} beside its zones ({close})", rows, columns)
+    title = f"Operating speeds of {findings.name} beside its zones ({close})"
+    return table_of(title, rows, ["speed", "kind", "verdict", "where", Column("nearest edge", "edge"), *away])
 
 
 def calmest(findings: Findings) -> tuple[float, float] | None:
@@ -216,11 +167,11 @@ def calmest(findings: Findings) -> tuple[float, float] | None:
 
 def _result(findings: Findings, chances: Ensemble | None, left: Sequence[str]) -> Section:
     sweep, found, orbits = findings.sweep, findings.zones, findings.orbits
-    lost, said, figures = failed(sweep), [], {}
+    lost, said, figures, speeds = failed(sweep), [], {}, counted(sweep.sizes["speed"], "speed")
     if orbits is not None and isinstance(found, Zones):
         said.append(
             f"{counted(len(found.zones), 'chaotic zone')} and {counted(len(orbits.loss.zones), 'zone')} without a "
-            f"stable synchronous orbit. At {np.mean(restless(sweep)):.0%} of {counted(sweep.sizes['speed'], 'speed')} "
+            f"stable synchronous orbit. At {np.mean(restless(sweep)):.0%} of {speeds} "
             f"some initial state of {sweep.sizes['start']} leads to chaos, for a while at least."
         )
         if (calm := calmest(findings)) is not None:
@@ -228,15 +179,13 @@ def _result(findings: Findings, chances: Ensemble | None, left: Sequence[str]) -
         spans = [(at.low_rpm, at.high_rpm) for at in findings.operating]
         limits = float(sweep["rpm"][0]), float(sweep["rpm"][-1])
         draw = lambda ax: zone_strip(orbits.loss.zones, found.zones, limits, spans, findings.published, ax)
-        strip = drawn(draw, 9.5, 1.9 if spans else 1.5)
-        figures["strip"] = strip, "Zones of both kinds over speed, with any operating speeds."
+        figures["strip"] = drawn(draw, 9.5, 1.5), "Zones of both kinds over speed, with any operating speeds."
     else:
         chaotic = sum(each.speeds for each in found if each.chaotic)  # pyright: ignore
-        speeds = counted(sweep.sizes["speed"], "speed")
         said.append(f"The largest exponent is positive beyond doubt at {chaotic} of {speeds}.")
-    for at, verdicts in assess(findings):
-        each = (f"{v.where} ({kind})" if kind == "motion" else _words(kind, v.state) for kind, v in verdicts.items())
-        said.append(f"{_both(findings, at)}: {', '.join(each)}.")
+    for at, verdicts in findings.assessed:
+        each = (v.where if kind == "motion" else _words(kind, v.state) for kind, v in verdicts.items())
+        said.append(f"{findings.words(at)}: {', '.join(each)}.")
     if readings_of(findings.model):
         said.append(f"All of this rests on two readings: {readings_words(findings.model)}.")
     if np.any(lost):
@@ -248,7 +197,11 @@ def _result(findings: Findings, chances: Ensemble | None, left: Sequence[str]) -
         )
     if left:
         said.append(f"Values that are still the template's, another bearing's: {', '.join(left)}.")
-    return Section("result", "In short", said, figures, key_figures=_key_figures(findings.model))
+    value, info, named = parameters(findings.model), parameter_info(findings.model), []
+    for name in (name for name in KEY_PARAMETERS if name in value):
+        unit, number = shown(float(value[name]), info[name].unit)
+        named.append(f"{name.replace('_', ' ')} {number:.4g} {unit}")
+    return Section("result", "In short", said, figures, notes=[f"The design: {', '.join(named)}."])
 
 
 def _words(kind: str, state: str) -> str:
@@ -256,44 +209,27 @@ def _words(kind: str, state: str) -> str:
     return said if said.endswith("chaos") else f"{said} {kind} zones"
 
 
-def _key_figures(model: Any) -> list[tuple[str, str]]:
-    value, info, named = parameters(model), parameter_info(model), []
-    for name in (name for name in KEY_PARAMETERS if name in value):
-        unit, number = shown(float(value[name]), info[name].unit)
-        named.append((name.replace("_", " "), f"{number:.4g} {unit}"))
-    oil = 1e3 * float(model.lubricant.dynamic_viscosity)
-    rollers = f"{model.bearing.n_rollers} of {1e3 * float(model.bearing.roller_diameter):.4g} mm"
-    return [*named, ("viscosity of the oil", f"{oil:.3g} mPa s"), ("rollers", rollers)]
-
-
 def _known(findings: Findings, chances: Ensemble) -> Section:
     """Chances of chaos over draws from the ranges of a design."""
-    other = _beside(findings)
+    other = findings.beside
     tables = chances_tables(findings.name, chances, other)
     if findings.operating and other is not None:
         tables = [operating_chances(chances, findings.operating, 1 / other[1]), *tables]
-    figure = drawn(lambda ax: chance_of_chaos(chances.rpm, chances.chance, chances.interval, ax), 9.5, 4.6)
     caption = f"Share of {chances.place.shape[0]} draws from the ranges that are chaotic, with 95 % bars."
-    figures, notes = {"chance": (_marked(figure, findings), caption)}, chances_notes(chances)
-    return Section("known", "What is known, and what it decides", notes, figures, tables)
+    figures = {"chance": (_marked(drawn(lambda ax: chance_of_chaos(chances, ax), 9.5, 4.6), findings), caption)}
+    return Section("known", "What is known, and what it decides", chances_notes(chances), figures, tables)
 
 
-def _motion(findings: Findings) -> Section:
-    """Stretches of speed with one motion of the cage."""
-    sweep, found = findings.sweep, findings.zones
-    assert not isinstance(found, Zones)
-    said = "A zone is a stretch of speeds with one motion of the cage. Bars are standard errors."
-    caption = "Quantities that the model reports over speed, means over initial states; zones are shaded."
-    tables = [stretches_table(findings.name, found)]
-    tables.append(quantities_table("Means over initial states", sweep, reported(sweep, SWEPT)))
+def _zones(findings: Findings) -> Section:
+    """Chaotic zones beside zones without a stable synchronous orbit; or stretches of speed with one motion."""
+    sweep, found, other, orbits = findings.sweep, findings.zones, findings.beside, findings.orbits
+    tables = motion_tables(findings.name, sweep, found, findings.published, other)
     figure = _marked(sweep_figure(sweep, found, findings.published), findings)
-    return Section("zones", "Over speed", [said], {"sweep": (figure, caption)}, tables)
-
-
-def _zones(findings: Findings, orbits: Orbits) -> Section:
-    """Chaotic zones, and zones without a stable synchronous orbit."""
-    sweep, found, other, name = findings.sweep, findings.zones, _beside(findings), findings.name
-    assert isinstance(found, Zones)
+    if orbits is None:
+        said = "A zone is a stretch of speeds with one motion of the cage. Bars are standard errors."
+        caption = "Quantities that the model reports over speed, means over initial states; zones are shaded."
+        tables.append(quantities_table("Means over initial states", sweep, reported(sweep, SWEPT)))
+        return Section("zones", "Over speed", [said], {"sweep": (figure, caption)}, tables)
     said = (
         "Two kinds of zone are never mixed. In a synchronous-loss zone the orbit that turns with the cage is not "
         "stable; its edges are bifurcations, solved for. In a chaotic zone some initial state leads to chaos; its "
@@ -304,22 +240,16 @@ def _zones(findings: Findings, orbits: Orbits) -> Section:
         "Vertical displacement once a revolution, over cage speed, from all initial states; beneath it the largest "
         "exponent. Chaotic zones are shaded."
     )
-    tables = [
-        loss_table(name, orbits.found, orbits.loss, findings.published, other),
-        zones_table(name, found, findings.published, (float(sweep["rpm"][0]), float(sweep["rpm"][-1])), other),
-        *transient_tables(name, found),
-    ]
-    figure = _marked(sweep_figure(sweep, found, findings.published), findings)
+    tables = [loss_table(findings.name, orbits.found, orbits.loss, findings.published, other), *tables]
     return Section("zones", "Zones", [said], {"orbits": (figure, caption)}, tables, coexisting_notes(orbits.loss))
 
 
 def _synchronous(findings: Findings, orbits: Orbits) -> Section:
-    found, figures, notes = orbits.found, {}, []
+    found, figures, notes, principal = orbits.found, {}, [], orbits.loss.principal
     if found.branches:
-        draw = lambda ax: orbit_diagram_with_branches(findings.sweep, found.branches, 1, ax)
+        draw = lambda ax: orbit_diagram_with_branches(findings.sweep, found.branches, ax)
         caption = "Orbits that turn with the cage, stable (thick) and unstable (thin), over the simulations (grey)."
         figures["branches"] = drawn(draw, 9.5, 5.4), caption
-        principal = orbits.loss.principal
         branch = found.branches[0 if principal is None else principal.branch]
         caption = (
             "Floquet multipliers along the branch on which most simulations settled. The orbit is stable while all are "
@@ -328,7 +258,7 @@ def _synchronous(findings: Findings, orbits: Orbits) -> Section:
         figures["multipliers"] = drawn(lambda ax: multiplier_circle(branch, ax), 7.0, 5.8), caption
     if further := len(found.edges) - len({id(p) for p in orbits.loss.edges.values()}):
         notes.append(f"{further} further ends of stable stretches bound no zone (jaxcage bifurcations lists them).")
-    tables = [edge_table(found, orbits.loss, _beside(findings), named=True)]
+    tables = [edge_table(found, orbits.loss, findings.beside, named=True)]
     return Section("stability", "The synchronous orbit", (), figures, tables, notes)
 
 
@@ -359,7 +289,7 @@ def _gradients(findings: Findings, orbits: Orbits) -> Section:
         "Exact derivatives of the edges with respect to every parameter. An elasticity of 0.10 means that one per cent "
         "more of the parameter moves the edge up by a tenth of a per cent."
     )
-    tables = [elasticities_table(findings.name, orbits.slopes, _beside(findings))]
+    tables = [elasticities_table(findings.name, orbits.slopes, findings.beside)]
     return Section("gradients", "What moves the edges", [said], figures, tables)
 
 
@@ -368,8 +298,7 @@ def _one_speed(findings: Findings, one: OneSpeed) -> list[Section]:
     rollers, title = rollers_of(findings.model, one.run), f"At {one.at}"
     caption = "The bearing at its largest pocket force, the path of its cage, slips and forces around it, spectra."
     figures = {"run": (run_figure(findings.model, one.run, rollers), caption)}
-    tables = run_tables(title, measures(findings.model, one.run), rollers)
-    found = [Section("run", title, (), figures, tables)]
+    found = [Section("run", title, (), figures, run_tables(title, measures(findings.model, one.run), rollers))]
     if one.slopes is not None:
         caption = "Per cent of a mean for one per cent of a parameter, with two standard errors."
         figures = {"slopes": (statistic_bars(one.slopes), caption)}
@@ -386,8 +315,8 @@ def _marked(figure: Figure, findings: Findings) -> Figure:
     return figure
 
 
-def _pairs(title: str, heads: tuple[str, str], rows: Mapping[str, str]) -> Table:
-    return Table(title, [Column(heads[0], list(rows)), Column(heads[1], list(rows.values()))])
+def _pairs(title: str, left: str, right: str, rows: Mapping[str, str]) -> Table:
+    return table_of(title, [{left: words, right: said} for words, said in rows.items() if said], [left, right])
 
 
 def _checks(findings: Findings) -> Table:
@@ -410,7 +339,7 @@ def _checks(findings: Findings) -> Table:
             untrusted = [f"{n} ({s.status})" for n, s in orbits.slopes.items() if not s.trusted]
             rows["gradients against the scaling of units, largest relative residual"] = residual_words(orbits.slopes)
             rows["edges whose gradient is not to be trusted"] = ", ".join(untrusted) or "none"
-    return _pairs("Checks of this report", ("check", "result"), rows)
+    return _pairs("Checks of this report", "check", "result", rows)
 
 
 def _settings(findings: Findings) -> Table:
@@ -419,17 +348,16 @@ def _settings(findings: Findings) -> Table:
     versions = [f"{k.removeprefix('version_')} {v}" for k, v in settings.items() if k.startswith("version_")]
     rpm, zones = sweep["rpm"].values, findings.zones
     closed = f"; windows below {zones.close_below_rpm:g} rpm closed" if isinstance(zones, Zones) else ""
-    span = f"from {rpm[0]:.0f} to {rpm[-1]:.0f} rpm"
+    speeds = f"{counted(rpm.size, 'speed')} from {rpm[0]:.0f} to {rpm[-1]:.0f} rpm"
     rows = {
         "versions": ", ".join([*versions, f"Python {platform.python_version()}"]),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         "readings": readings_words(findings.model),
-        "sweep": f"{counted(rpm.size, 'speed')} {span}, {counted(sweep.sizes['start'], 'initial state')}",
-        "length": length(sweep),
+        "sweep": f"{speeds}, {counted(sweep.sizes['start'], 'initial state')}, {length(sweep)}",
         "resolution": f"{resolution_rpm(sweep):.0f} rpm{closed}",
         "steps of the sweep": " ".join(str(settings.get("method", "")).split()),
         "steps of orbits": "" if findings.orbits is None else findings.orbits.method,
         "random numbers": "none: the initial states are fixed",
         "time": ", ".join(f"{stage} {s:.0f} s" for stage, s in findings.seconds.items()),
     }
-    return _pairs("Settings", ("what", "value"), {name: words for name, words in rows.items() if words})
+    return _pairs("Settings", "what", "value", rows)
