@@ -112,10 +112,6 @@ def report(
     table, left = (None, ()) if subject.file is None else (subject.file.table, subject.file.left)
     html = jc.show.page(found, table=table, command=visible(shlex.join(words)), chances=chances, left=left)
     tables = [jc.show.verdict_table(found)] if at else []
-    tables += [] if chances is None else jc.show.chances_tables(subject.name, chances, subject.beside)
-    tables += jc.show.motion_tables(subject.name, found.sweep, found.zones, subject.published, subject.beside)
-    if (orbits := found.orbits) is not None:
-        tables.append(jc.show.loss_table(subject.name, orbits.found, orbits.loss, subject.published, subject.beside))
     each = [f"{where}: {v.state} ({kind})" for where, verdicts in found.assessed for kind, v in verdicts.items()]
     document = {"quick": quick, "stages": found.seconds, "bytes": len(html.encode())}
     document["operating"] = [vars(where) | verdicts for where, verdicts in found.assessed]

@@ -46,22 +46,19 @@ def visible(text: str) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
-def shorten_cache_warnings() -> None:
-    """Make one sentence of all that Python and JAX warn of compiled programs that cannot be stored or used."""
-    shown, told = warnings.showwarning, set()
+def shorten_warnings() -> None:
+    """Say each warning in one line, and only once; what JAX says of each compiled program in one sentence for all."""
+    told = set()
 
     def show(message: Warning | str, *where: Any, **more: Any) -> None:
-        text = str(message)
+        text = f"Warning: {message}"
         if "persistent compilation cache" in text:
-            text = "a stored compiled program cannot be used, or not be stored: it is compiled anew."
-        elif not text.startswith("Compiled programs are not kept"):
-            return shown(message, *where, **more)
+            text = "Warning: a stored compiled program cannot be used, or not be stored: it is compiled anew."
         if text not in told:
-            say(f"Warning: {text}")
+            say(text)
         told.add(text)
 
-    if getattr(shown, "__name__", "") != show.__name__:
-        warnings.showwarning = show
+    warnings.showwarning = show
 
 
 def end_at_once_when_interrupted() -> None:

@@ -218,8 +218,7 @@ def compare(
         jc.show.differences_table(names, [each.model for each in pair]),
         *(dataclasses.replace(table, key="") for table in tables),
     ]
-    files = {"figure": jc.show.sweeps_beside(names, found, [zones_of(data) for data in found])}
-    files["measures"] = jc.show.quantities_beside(names, found, [n for n in means[0] if n != "exponent"])
+    files = {"figure": jc.show.quantities_beside(names, found, list(means[0]), title=" and ".join(names))}
     return Answer(" ".join(said), tables, [], {"cases": names, "designs": designs}, files, f"_{names[1]}")
 
 

@@ -26,7 +26,7 @@ from .progress import (
     interrupted_status,
     progress,
     say,
-    shorten_cache_warnings,
+    shorten_warnings,
 )
 from .subject import read_case
 
@@ -87,7 +87,7 @@ def _run(call: functools.partial[Answer]) -> None:
     if show is not None and show.no_cache:
         os.environ["JAXCAGE_CACHE"] = "off"
     elif show is not None:
-        shorten_cache_warnings()
+        shorten_warnings()
         keep_compiled_programs()
     try:
         answer = call() if show is None else _of_a_case(call, show)

@@ -61,7 +61,6 @@ from .diagrams import (
     published_edges as published_edges,
     quantities_beside as quantities_beside,
     sweep_figure as sweep_figure,
-    sweeps_beside as sweeps_beside,
 )
 from .findings import Findings as Findings, examine as examine, require_some as require_some
 from .maps import (

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..design import Clue, Ensemble, Narrowed, verdict_of
+from ..design import Clue, Ensemble, Narrowed
 from ..files import Measurement, Range
 from .tables import Beside, Column, Table, chosen, speed_columns, table
 
@@ -91,21 +91,6 @@ def measures_words(clues: Sequence[Clue]) -> str:
     if not telling:
         return "No single value decides: measure all, or draw more (--draws)."
     return f"Measure {'; '.join(f'{c.label} ({c.source}), {c.share:.0%} of the verdict' for c in telling)}."
-
-
-def operating_chances(found: Ensemble, operating: Sequence[Any], ratio: float) -> Table:
-    """Verdicts at operating speeds; of a range, the chance that some speed in it is chaotic."""
-    rows = []
-    for at in operating:
-        which = found.between(at.low_rpm, at.high_rpm)
-        done = ~np.any(found.failed[:, which], axis=1) | np.any(found.chaotic[:, which], axis=1)
-        hits, of = int(np.sum(np.any(found.chaotic[done][:, which], axis=1))), int(np.sum(done))
-        verdict = verdict_of(hits, of, len(done))
-        row = {"cage speed": str(at), "shaft speed": str(at.of_shaft(ratio)), "verdict": WORDS.get(verdict, verdict)}
-        clues = measures_words(found.clues(which)) if verdict == "not decided" else None
-        rows.append(row | {"chance": hits / of if of else None, "measure": clues})
-    columns = ["cage speed", "shaft speed", Column("chance", shown="%", digits=0), "verdict", "measure"]
-    return table("Operating speeds, by known values", rows, columns)
 
 
 def measured_table(found: Narrowed, measured: Sequence[Measurement], beside: Beside = None) -> Table:

@@ -148,7 +148,7 @@ def chance_of_chaos(found: "Ensemble", ax: Axes | None = None) -> Axes:
     pad = 0.01 * (rpm[-1] - rpm[0]) or 50.0
     ax.set(ylim=(-0.05, 1.05), xlim=(rpm[0] - pad, rpm[-1] + pad), ylabel="Chance of chaos")
     ax.set_yticks(np.linspace(0, 1, 6))
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, frameon=False, fontsize=8.5)
+    style.legend_above(ax, 3)
     return label_speed(ax)
 
 

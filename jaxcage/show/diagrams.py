@@ -29,8 +29,7 @@ CAGE, SHAFT = "Cage speed $n$ [rpm]", "Shaft speed [rpm]"
 BELOW = 36.0
 """Distance of the axis of the other speed from that of the speed [points]."""
 SWEPT = ("cage_slip", "pocket_force_mean_sum_N", "pocket_force_max_N", "friction_power_W", "synchronous_force_x_N")
-COMPARED = ("cage_slip", "friction_power_W", "pocket_impulse_N_s", "land_impulse_N_s", "pocket_wear_mm3_per_h")
-"""Quantities of a whole bearing in the figure of a sweep and in that of several bearings."""
+"""Quantities of a whole bearing in the figure of a sweep."""
 BESIDE_COLOURS = (style.BLUE, style.VERMILION, *style.LINE_COLOURS[1:4])
 """Colours of designs beside each other."""
 
@@ -50,11 +49,10 @@ def speed_limits(sweep: xr.Dataset) -> Span:
     return (first, last) if last > first else (first - 50, first + 50)
 
 
-def add_shaft_axes(figure: Figure, speeds: xr.Dataset | float, axes: Sequence[Axes] | None = None) -> Figure:
+def add_shaft_axes(figure: Figure, speeds: xr.Dataset | float) -> Figure:
     """Add a second axis beneath every axis of the cage speed, for the speed of the shaft.
 
-    **Arguments:** figure; a sweep, whose coordinates include both speeds, or the cage speed over the shaft speed; axes
-    of the figure, by default all.
+    **Arguments:** figure; a sweep, whose coordinates include both speeds, or the cage speed over the shaft speed.
 
     **Returns:** the same figure. A sweep over another speed, and axes that have their second axis, stay as they are.
     """
@@ -62,24 +60,20 @@ def add_shaft_axes(figure: Figure, speeds: xr.Dataset | float, axes: Sequence[Ax
         if "shaft_rpm" not in speeds.coords:
             return figure
         speeds = float(speeds["rpm"][-1] / speeds["shaft_rpm"][-1])
-    for ax in figure.axes if axes is None else axes:
+    for ax in figure.axes:
         if ax.get_xlabel() == CAGE and not any(child.get_xlabel() == SHAFT for child in ax.child_axes):
             _add_below(ax, speeds)
     return figure
 
 
 def _add_below(ax: Axes, ratio: float) -> None:
-    move = lambda points: offset_copy(ax.transAxes, ax.figure, y=-points, units="points")  # pyright: ignore
+    beneath = offset_copy(ax.transAxes, ax.figure, y=-BELOW, units="points")  # pyright: ignore
     both = (lambda x: np.asarray(x) / ratio, lambda x: np.asarray(x) * ratio)
-    shaft = ax.secondary_xaxis(0.0, functions=both, transform=move(BELOW))
+    shaft = ax.secondary_xaxis(0.0, functions=both, transform=beneath)
     shaft.set_xlabel(SHAFT)
     shaft.xaxis.set_major_formatter(StrMethodFormatter("{x:.0f}"))
     shaft.tick_params(color=style.GREY, labelsize=9)
     shaft.spines["bottom"].set(color=style.GREY, linewidth=0.8)
-    legend = ax.get_legend()
-    if legend is not None and legend.get_bbox_to_anchor().y1 < ax.get_window_extent().y0:  # it was beneath already
-        legend.set_loc("upper center")
-        legend.set_bbox_to_anchor((0.5, 0.0), transform=move(2 * BELOW))
 
 
 def shade_zones(ax: Axes, zones: Zones | Sequence[Stretch]) -> Axes:
@@ -228,13 +222,12 @@ def exponent_strip(sweep: xr.Dataset, ax: Axes | None = None) -> Axes:
 def _exponent_limits(values: np.ndarray, top: np.ndarray, band: np.ndarray) -> Span:
     """Limits that include every exponent and bar above zero, or the line of the largest exponents where all are
     negative."""
-    finite = values[np.isfinite(values)]
-    seen = (top + band)[np.isfinite(top + band)]
-    if finite.size == 0:
+    if not np.any(np.isfinite(values)):
         return -0.05, 0.1
-    high = max(0.1, 1.15 * float(finite.max()), 1.05 * float(seen.max(initial=0.0)))
-    calm = float(np.nanmin(top)) if float(finite.max()) <= 0 else 0.0
-    return max(min(1.15 * float(finite.min()), -0.05), min(1.15 * calm, -high)), high
+    least, most = float(np.nanmin(values)), float(np.nanmax(values))
+    high = max(0.1, 1.15 * most, 1.05 * float(np.nanmax(top + band)))
+    calm = float(np.nanmin(top)) if most <= 0 else 0.0
+    return max(min(1.15 * least, -0.05), min(1.15 * calm, -high)), high
 
 
 def _lines(ax: Axes, name: str, sweeps: dict[str, xr.Dataset]) -> Axes:
@@ -278,33 +271,6 @@ def sweep_figure(
             mark_published(ax, published, text=ax is figure.axes[0])
     style.legend_below(figure)
     return add_shaft_axes(figure, sweep)
-
-
-def sweeps_beside(
-    names: Sequence[str], sweeps: Sequence[xr.Dataset], zones: Sequence[Zones | Sequence[Stretch]]
-) -> Figure:
-    """Designs beside each other on one scale: orbit diagrams with exponents beneath, or what whole bearings report.
-
-    **Arguments:** names; sweeps; zones of each sweep, which are shaded.
-    """
-    if any("strobe" not in sweep for sweep in sweeps):
-        return quantities_beside(names, sweeps, [*reported(sweeps[0], COMPARED), "exponent"])
-    figure = style.new_figure(12.0, 6.4)
-    cells = figure.subplots(2, len(sweeps), sharex="col", squeeze=False, height_ratios=(2.0, 1.0))
-    for (above, below), name, sweep, found in zip(cells.T, names, sweeps, zones, strict=True):
-        orbit_diagram(sweep, 1, above).set(xlabel="")
-        above.set_title(name, loc="left", fontsize=10)
-        for ax in (above, exponent_strip(sweep, below)):
-            shade_zones(ax, found)
-    for row in cells:
-        limits = np.array([ax.get_ylim() for ax in row])
-        for ax in row:
-            ax.set_ylim(limits[:, 0].min(), limits[:, 1].max())
-            ax.label_outer()
-    for ax, sweep in zip(cells[1], sweeps, strict=True):
-        add_shaft_axes(figure, sweep, [ax])
-    style.legend_below(figure)
-    return figure
 
 
 def quantities_beside(

@@ -71,8 +71,7 @@ def branch_diagram(branches: Sequence[Branch], ax: Axes | None = None) -> Axes:
         look: dict[str, Any] = {"color": style.GREY, "markersize": 4.5, "markerfacecolor": "white"}
         ax.plot([], [], "o", **look, label="hollow: unstable on both sides")
     _write_above(ax, [p for p in special if p.edge])
-    below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 4}
-    style.enlarge_dots(ax.legend(**below, frameon=False, fontsize=8.5, handlelength=2.0, columnspacing=1.6))
+    style.legend_beside(ax)
     return label_speed(ax)
 
 

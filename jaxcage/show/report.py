@@ -22,7 +22,7 @@ from .._parameters import parameter_info, parameters, readings_of
 from ..analysis import Zones, failed, length, measures, resolution_rpm, restless
 from ..bearing import design_rule_violations
 from ..design import Ensemble
-from .chance_tables import chances_answer, chances_notes, chances_tables, operating_chances
+from .chance_tables import chances_answer, chances_notes, chances_tables
 from .design_figures import chance_of_chaos, elasticity_bars, statistic_bars
 from .diagrams import SWEPT, add_shaft_axes, mark_operating, reported, sweep_figure, zone_strip
 from .findings import Findings, OneSpeed, Orbits
@@ -211,12 +211,9 @@ def _words(kind: str, state: str) -> str:
 
 def _known(findings: Findings, chances: Ensemble) -> Section:
     """Chances of chaos over draws from the ranges of a design."""
-    other = findings.beside
-    tables = chances_tables(findings.name, chances, other)
-    if findings.operating and other is not None:
-        tables = [operating_chances(chances, findings.operating, 1 / other[1]), *tables]
-    caption = f"Share of {chances.place.shape[0]} draws from the ranges that are chaotic, with 95 % bars."
+    caption = f"Share of {len(chances.place)} draws from the ranges that are chaotic, with 95 % bars."
     figures = {"chance": (_marked(drawn(lambda ax: chance_of_chaos(chances, ax), 9.5, 4.6), findings), caption)}
+    tables = chances_tables(findings.name, chances, findings.beside)
     return Section("known", "What is known, and what it decides", chances_notes(chances), figures, tables)
 
 

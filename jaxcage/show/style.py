@@ -121,7 +121,8 @@ def legend_above(ax: Axes, ncols: int = 4, size: float | int = 9) -> None:
 
 def legend_beside(ax: Axes, size: float | int = 9) -> None:
     """A legend to the right of the frame."""
-    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=size, handlelength=1.4)
+    place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+    enlarge_dots(ax.legend(**place, frameon=False, fontsize=size, handlelength=1.4))
 
 
 def legend_below(figure: Figure, ncols: int = 5) -> None:
