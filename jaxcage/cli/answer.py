@@ -53,8 +53,9 @@ def complete(answer: Answer, command: str, subject: Subject, out: str, seconds: 
     stem = Path(out) / f"{command}_{subject.name}{answer.part}"
     written = {key: str(_written(key, content, stem, subject)) for key, content in answer.files.items()}
     document = {"case": subject.name, **{table.key: table.records for table in answer.tables if table.key}}
-    document |= {**answer.document, **subject.document(answer.by_ranges), "seconds": round(seconds, 2), **written}
-    notes = [*answer.notes, *subject.notes(answer.by_ranges), f"Time: {seconds:.1f} s"]
+    about, notes = subject.about(answer.by_ranges)
+    document |= {**answer.document, **about, "seconds": round(seconds, 2), **written}
+    notes = [*answer.notes, *notes, f"Time: {seconds:.1f} s"]
     notes += [f"{key.replace('_', ' ').capitalize()}: {visible(path)}" for key, path in written.items()]
     return dataclasses.replace(answer, document=document, notes=notes)
 

@@ -1,9 +1,10 @@
 """Commands about the case itself: its file, its statics, a report."""
 
 import shlex
+import time
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tyro
@@ -13,9 +14,14 @@ import jaxcage as jc
 from .._errors import InputError
 from . import options as o
 from .answer import Answer
+from .orbit_commands import bars, explained, gradient, mapped, of_orbits
 from .progress import report as tell, visible
-from .speed_commands import draw
-from .subject import RPM
+from .speed_commands import chances, simulate, swept, zones_of
+from .subject import RPM, Subject
+
+
+FOLLOWED = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
+"""Edges that are followed across the map, which takes about a minute each."""
 
 
 def init(
@@ -69,7 +75,9 @@ def statics(
         jc.show.statics_table(f"Statics of {title}", model, found, shaft),
         jc.show.table("Rollers", rollers, columns, "rollers"),
     ]
-    document = {n: float(getattr(found, n)) for n in ("max_load", "shaft_shift", "elastic_approach", "half_angle")}
+    document: dict[str, Any] = {
+        n: float(getattr(found, n)) for n in ("max_load", "shaft_shift", "elastic_approach", "half_angle")
+    }
     document |= {"load": force, "shaft_speed_rpm": shaft * RPM}
     document["cage_displacement"] = jc.show.displacements(model, found)
     document["kinematics"] = {
@@ -102,18 +110,90 @@ def report(
     at = jc.show.read_operating(operating, subject.model, subject.speeds)
     if operating and not at:
         raise InputError(f"Option --operating must hold a speed, but '{operating}' was given.")
-    speeds, chances = subject.range(over, subject.usual(126 if quick else 251, 5 if quick else 13)), None
-    given = {"speeds": speeds, "operating": at, "quick": quick, "progress": tell, **run.settings}
-    found = jc.show.examine(subject.name, subject.model, subject.published, **given)
+    began, sections, orbits, loss = time.perf_counter(), [], None, ()
+    speeds = subject.range(over, subject.usual(126 if quick else 251, 5 if quick else 13))
+    found, answer = swept(subject, speeds, run)
+    zones, limits = zones_of(found), (float(found["rpm"][0]), float(found["rpm"][-1]))
+    said = []
+    if subject.with_rollers:
+        sections += [("Over speed", answer), *(_at_one_speed(subject, at[0], quick) if at else [])]
+    else:
+        orbits = jc.orbits.synchronous_orbits(
+            subject.model, speeds[0], speeds[-1], settled=found, method=run.method, progress=tell
+        )
+        answer, zones, slopes = explained(subject, found, orbits, answer, quick, run.method)
+        sections += [("Zones", answer), *_of_orbits(subject, orbits, slopes, quick, run.method)]
+        loss = jc.loss_zones(orbits).zones
+        if calm := jc.show.calmest((*zones.zones, *zones.transient, *loss), *limits):
+            said.append(f"The widest range outside all zones goes from {calm[0]:.0f} to {calm[1]:.0f} rpm.")
     if subject.unknowns and draws:
-        chances = draw(subject, o.Range(over.first, over.last), draws, seed, run)
-    words = ["jaxcage", "report", Path(subject.path).name or subject.name]
-    words += [*(["--operating", operating] if operating else []), *(["--quick"] if quick else [])]
+        chance = chances(subject, o.Range(over.first, over.last), draws, seed, run)
+        sections.insert(0, ("What is known, and what it decides", chance))
+        said.append(f"All zones of this page are those of the best guesses. {chance.sentence}")
+    if float(getattr(subject.model, "load", 0.0)) > 0:
+        sections.append(("Statics", statics(subject)))
+    assessed = jc.show.assess(at, found, zones, orbits, loss)
+    verdicts = [jc.show.verdict_table(subject.name, assessed)] if at else []
+    each = [f"{where}: {v.state} ({kind})" for where, by in assessed for kind, v in by.items()]
     table, left = (None, ()) if subject.file is None else (subject.file.table, subject.file.left)
-    html = jc.show.page(found, table=table, command=visible(shlex.join(words)), chances=chances, left=left)
-    tables = [jc.show.verdict_table(found)] if at else []
-    each = [f"{where}: {v.state} ({kind})" for where, verdicts in found.assessed for kind, v in verdicts.items()]
-    document = {"quick": quick, "stages": found.seconds, "bytes": len(html.encode())}
-    document["operating"] = [vars(where) | verdicts for where, verdicts in found.assessed]
-    notes = [f"Stages: {', '.join(f'{stage} {seconds:.0f} s' for stage, seconds in found.seconds.items())}"]
-    return Answer(f"{'; '.join(each) or 'The report is written'}.", tables, notes, document, {"report": html})
+    summary = jc.show.Section(
+        "In short", [*each, answer.sentence, *said], tables=verdicts, notes=subject.about(False)[1]
+    )
+    source = jc.show.Section("The design", tables=[jc.show.sources_table(subject.model, table, left)])
+    made = jc.show.settings_table(found, time.perf_counter() - began)
+    html = jc.show.page(
+        f"{'Case ' * (subject.published is not None)}{subject.name}",
+        f"Cylindrical roller bearing, {limits[0]:.0f} to {limits[1]:.0f} rpm of the {subject.own}",
+        [
+            summary,
+            *(_section(*each) for each in sections),
+            source,
+            jc.show.Section("How it was computed", tables=[made], notes=[jc.show.PAPER]),
+        ],
+        sweep=found,
+        operating=at,
+        command=visible(shlex.join(_words(subject, operating, quick))),
+    )
+    document = {"quick": quick, "bytes": len(html.encode())}
+    document["operating"] = [vars(where) | by for where, by in assessed]
+    return Answer(f"{'; '.join(each) or answer.sentence}", [*verdicts], said, document, {"report": html})
+
+
+def _words(subject: Subject, operating: str, quick: bool) -> list[str]:
+    """The words of the command that makes this report."""
+    words = ["jaxcage", "report", Path(subject.path).name or subject.name]
+    return words + (["--operating", operating] if operating else []) + (["--quick"] if quick else [])
+
+
+def _section(title: str, answer: Answer) -> Any:
+    """An answer as a section of the page."""
+    from matplotlib.figure import Figure
+
+    figures = {name: (x, x.get_suptitle()) for name, x in answer.files.items() if isinstance(x, Figure)}
+    return jc.show.Section(title, [answer.sentence], figures, answer.tables, answer.notes)
+
+
+def _at_one_speed(subject: Subject, at: Any, quick: bool) -> list[tuple[str, Answer]]:
+    """A run of a bearing with its rollers at an operating speed, and slopes of means there."""
+    speed = jc.files.SpeedOf((at.low_rpm + at.high_rpm) / 2, subject.own)
+    found = [(f"At {at}", simulate(subject, speed=speed, run=o.RunOptions(discard=20, revolutions=20)))]
+    means = o.MeanOptions(speed, discard=20, revolutions=20)
+    return found if quick else [*found, ("What moves the means", gradient(subject, means=means))]
+
+
+def _of_orbits(
+    subject: Subject, orbits: Any, slopes: dict[str, Any], quick: bool, method: Any
+) -> list[tuple[str, Answer]]:
+    """Synchronous orbits, a map over speed and guidance gap, and elasticities of edges."""
+    found, loss, axis = [], jc.loss_zones(orbits), jc.show.parameter_axis(subject.model, "guidance_gap")
+    if orbits.branches:
+        found.append(("The synchronous orbit", of_orbits(subject, orbits, loss)))
+    edges = {} if quick else {name: edge for name, edge in loss.edges.items() if name in FOLLOWED}
+    count, discard, revolutions = ((40, 7), 100, 60) if quick else ((80, 12), 250, 100)
+    length = {"discard": discard, "revolutions": revolutions, "blocks": 1, "keep": 1, "method": method}
+    ends = float(jc.rpm(orbits.lower_rpm)), float(jc.rpm(orbits.upper_rpm))
+    found.append(("Stability map", mapped(subject, ends, axis, count, edges, {}, length)))
+    if trusted := [s for name, s in slopes.items() if s.trusted and name in loss.edges]:
+        said = "Relative change of the edges, which are solved for, by that of a parameter that a designer can choose."
+        found.append(("What moves the edges", Answer(said, files={"figure": bars(subject, trusted)})))
+    return found

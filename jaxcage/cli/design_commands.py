@@ -73,8 +73,7 @@ def design(
         steps: Of surrogate: steps of the search; 10 if left out, of a bearing 12.
         batch: Of surrogate: designs of a step; 12 if left out, of a bearing 16.
     """
-    subject, d = subject.under(means.load), jc.design
-    model, bounds = subject.model, read_bounds(vary, subject)
+    d, model, bounds = jc.design, subject.model, read_bounds(vary, subject)
     notes = [] if worse_balance else no_worse_balance(model, bounds)
     search = search or ("surrogate" if calm.operating is None else "slsqp")
     if search not in (known := ("surrogate", *d.SEARCHES)):
@@ -202,8 +201,7 @@ def sensitivity(
         samples: Base samples of the Sobol indices, a power of 2; 64 if left out, of a bearing 32.
         tolerance: Tolerance of every parameter but constants, ± so many percent, uniformly distributed.
     """
-    subject, d = subject.under(means.load), jc.design
-    model, name, bounds, files = subject.model, subject.name, read_bounds(vary, subject), {}
+    d, model, name, bounds, files = jc.design, subject.model, subject.name, read_bounds(vary, subject), {}
     if of not in d.BEARING_MEASURES:
         raise InputError(f"Option --of must be one of {', '.join(d.BEARING_MEASURES)}, but '{of}' was given.")
     runs, measured = _runs(subject, over, means, seed, partial(report, "designs")), d.BEARING_MEASURES[of]

@@ -31,24 +31,32 @@ def zones(
 
     Of a bearing with its rollers stretches of speed with the same motion; of a file with ranges chances of chaos.
     """
-    subject = subject.under(load)
     if subject.unknowns and draws:
         return chances(subject, over, draws, seed, run)
-    found, answer = swept(subject, over, run)
+    found, answer = swept(subject, subject.range(over, subject.usual(251, 13)), run)
     if subject.with_rollers:
         return answer
-    model, method, name, beside = subject.model, run.method, subject.name, subject.beside
     ends = float(found["speed"][0]), float(found["speed"][-1])
-    orbits = jc.orbits.synchronous_orbits(model, *ends, settled=found, method=method, progress=report)
-    loss, explained = jc.loss_zones(orbits), jc.orbits.explain(jc.zones(found), orbits, model, method)
-    slopes = {} if quick else jc.show.edge_slopes(model, loss, explained, method)
+    orbits = jc.orbits.synchronous_orbits(subject.model, *ends, settled=found, method=run.method, progress=report)
+    return explained(subject, found, orbits, answer, quick, run.method)[0]
+
+
+def explained(
+    subject: Subject, found: Any, orbits: Any, answer: Answer, quick: bool, method: Any
+) -> tuple[Answer, Any, dict[str, Any]]:
+    """The answer about a sweep with the mechanisms of its zones and the zones without a stable synchronous orbit; the
+    chaotic zones; and the sensitivities of exact edges."""
+    name, beside, loss = subject.name, subject.beside, jc.loss_zones(orbits)
+    known = jc.orbits.explain(jc.zones(found), orbits, subject.model, method)
+    slopes = {} if quick else jc.show.edge_slopes(subject.model, loss, known, method)
     tables = [
-        *jc.show.motion_tables(name, found, explained.zones, subject.published, beside),
+        *jc.show.motion_tables(name, found, known.zones, subject.published, beside),
         jc.show.loss_table(name, orbits, loss, subject.published, beside),
         *([jc.show.elasticities_table(name, slopes, beside)] if slopes else []),
     ]
-    notes = [*jc.show.source_notes(explained), *jc.show.unsettled_notes(orbits), *answer.notes]
-    return dataclasses.replace(answer, sentence=said_of(found, explained.zones), tables=tables, notes=notes)
+    notes = [*jc.show.source_notes(known), *jc.show.unsettled_notes(orbits), *answer.notes]
+    said = said_of(found, known.zones)
+    return dataclasses.replace(answer, sentence=said, tables=tables, notes=notes), known.zones, slopes
 
 
 def _searched(subject: Subject, over: o.Range, discard: int | None, method: Any, purpose: str = "") -> tuple[Any, Any]:
@@ -83,9 +91,13 @@ def bifurcations(
     Args:
         discard: Revolutions of the simulations that are left out at the beginning.
     """
-    name, beside = subject.name, subject.beside
     subject.require_orbits("bifurcations")
-    found, loss = _searched(subject, over, discard, steps.method)
+    return of_orbits(subject, *_searched(subject, over, discard, steps.method))
+
+
+def of_orbits(subject: Subject, found: Any, loss: Any) -> Answer:
+    """The answer about synchronous orbits over speed, of which there are some."""
+    name, beside = subject.name, subject.beside
     main = found.branches[0 if loss.principal is None else loss.principal.branch]
     orbits = partial(jc.show.orbit_diagram_with_branches, found.sweep, found.branches)
     files = {
@@ -136,7 +148,6 @@ def gradient(
         designs: With --lasting or --speed: designs around this one from which slopes are estimated.
         chaos: With --speed: the mean slope of the largest Lyapunov exponent as well.
     """
-    subject = subject.under(means.load)
     model, method, name = subject.model, steps.method, subject.name
     given: dict[str, Any] = {"designs": designs, "seed": seed}
     if subject.with_rollers:
@@ -155,8 +166,6 @@ def gradient(
         raise NoResult(f"No edge is a function of the design here ({reasons}): try more --steps.")
     ends: list[Any] = [trusted.get(f"zone 1 {end}") for end in ("onset", "exit")]
     each = [*([jc.orbits.width(ends[0], ends[1], "zone 1 width")] if all(ends) else []), *trusted.values()]
-    bars = partial(jc.show.elasticity_bars, jc.show.to_be_turned(model, each))
-    figure = jc.show.drawn(bars, 9.0, 2.2 + 1.2 * len(each), f"{name}: elasticities of the edges")
     tables = [
         jc.show.elasticities_table(name, edges, subject.beside),
         jc.show.width_table(f"Widths of the synchronous-loss zones of {name}", edges, jc.show.FIRST),
@@ -168,7 +177,13 @@ def gradient(
     notes = [f"Left out: {n}, {e.kind} ({e.status})." for n, e in edges.items() if not e.trusted]
     residual = jc.show.residual_words(edges)
     notes.append(f"Gradients against the scaling of units, largest relative residual: {residual}")
-    return Answer(said, tables, notes, {}, {"figure": figure})
+    return Answer(said, tables, notes, {}, {"figure": bars(subject, each)})
+
+
+def bars(subject: Subject, slopes: list[Any]) -> Any:
+    """The figure of the elasticities of edges or widths."""
+    draw = partial(jc.show.elasticity_bars, jc.show.to_be_turned(subject.model, slopes))
+    return jc.show.drawn(draw, 9.0, 2.2 + 1.2 * len(slopes), f"{subject.name}: elasticities of the edges")
 
 
 def _of_lasting(subject: Subject, over: o.Range, zone: int, names: tuple[str, ...], given: dict[str, Any]) -> Answer:
@@ -266,34 +281,52 @@ def map_(
             given |= {} if text is None else {end: jc.files.to_si(text, info[y].unit)}
         except ValueError as error:
             raise ArgumentError(end, said=f"{error}.") from error
-    (low, high), axis = subject.ends(over), jc.show.parameter_axis(model, y, **given)
-    title, count = f"{subject.name} over speed and {y}", points or subject.usual((50, 12), (13, 8))
-    document = {"x": "speed", "y": y, "x_range": (low * RPM, high * RPM), "y_range": (axis.lower, axis.upper)}
-    found, curves, refused, said, files, tables = None, [], {}, [], {}, []
+    axis, curves = jc.show.parameter_axis(model, y, **given), not (no_curves or subject.with_rollers)
+    edges, refused = {}, {}
     if no_points:
         subject.require_orbits("map --no-points")
-    else:
+    if curves:
+        try:
+            discard = 1000 if run.discard is None else run.discard
+            edges = _searched(subject, over, discard, run.method, "follow")[1].edges
+        except NoResult as error:
+            if no_points:
+                raise
+            refused = {"edges": str(error).rstrip(".")}
+    usual = subject.usual({"discard": 1000, "revolutions": 100, "blocks": 20}, {"discard": 20, "revolutions": 20})
+    settings = usual | run.settings | {"starts": starts, "persist": persist}
+    count = None if no_points else points or subject.usual((50, 12), (13, 8))
+    return mapped(subject, subject.ends(over), axis, count, edges, refused, settings)
+
+
+def mapped(
+    subject: Subject,
+    ends: tuple[float, float],
+    axis: Any,
+    count: tuple[int, int] | None,
+    edges: dict[str, Any],
+    refused: dict[str, str],
+    settings: dict[str, Any],
+) -> Answer:
+    """The answer about a map over speeds [rad/s] and a parameter: lanes at points, if any, and edges followed."""
+    low, high = ends
+    found, said, files, tables, y = None, [], {}, [], axis.name
+    title = f"{subject.name} over speed and {y}"
+    document = {"x": "speed", "y": y, "x_range": (low * RPM, high * RPM), "y_range": (axis.lower, axis.upper)}
+    if count is not None:
         grid = {"speed": np.linspace(low, high, count[0])}, {y: np.linspace(axis.lower, axis.upper, count[1])}
-        usual = subject.usual({"discard": 1000, "revolutions": 100, "blocks": 20}, {"discard": 20, "revolutions": 20})
-        found = jc.label_map(model, *grid, **usual | run.settings, starts=starts, persist=persist, stage=report)
+        found = jc.label_map(subject.model, *grid, **settings, stage=report)
         jc.show.require_some(found)
         labels, files["data"] = counted(found), found
         document |= {"points": count, "labels": labels, "exponents": jc.show.top_exponent(found)}
         tables.append(jc.show.shares_table(f"Points of {title}", "label", labels))
         said.append(f"most points are {max(labels, key=labels.__getitem__)}")
-    if not (no_curves or subject.with_rollers):
-        try:
-            _, loss = _searched(subject, over, 1000 if run.discard is None else run.discard, run.method, "follow")
-            curves, refused = jc.show.follow_edges(model, loss.edges, (low, high), axis, run.method, report)
-        except NoResult as error:
-            if found is None:
-                raise
-            refused = {"edges": str(error).rstrip(".")}
+    curves, lost = jc.show.follow_edges(subject.model, edges, ends, axis, settings.get("method"), report)
     if curves:
         tables.insert(0, jc.show.curves_table(f"Edges of {title}", curves, axis))
         files["curve_data"] = jc.show.curve_columns(curves, axis)
         said.insert(0, f"{jc.show.counted(len(curves), 'edge')} followed")
     files["figure"] = jc.show.map_figure(axis, curves, found, title)
-    notes = [f"Not followed: {edge} ({why})" for edge, why in refused.items()]
+    notes = [f"Not followed: {edge} ({why})" for edge, why in (refused | lost).items()]
     said = f"Over speed and {y}: {', '.join(said) or 'no edge could be followed'}."
     return Answer(said, tables, notes, document, files, f"_speed_{y}")

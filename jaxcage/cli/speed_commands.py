@@ -44,7 +44,6 @@ def simulate(
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
     """Time history and forces at one speed, of 20 revolutions if left out; slips of a bearing with its rollers."""
-    subject = subject.under(load)
     model, at, method = subject.model, subject.speed(speed), run.method
     steps = getattr(method, "steps", 128)  # of equal steps the samples must divide the number
     length: dict[str, Any] = {"revolutions": run.revolutions or 20, "discard": run.discard or 0}
@@ -83,13 +82,15 @@ def sweep(
 
     Of a file with ranges chances of chaos.
     """
-    subject = subject.under(load)
-    return chances(subject, over, draws, seed, run) if subject.unknowns and draws else swept(subject, over, run)[1]
+    return (
+        chances(subject, over, draws, seed, run)
+        if subject.unknowns and draws
+        else swept(subject, subject.range(over, subject.usual(251, 13)), run)[1]
+    )
 
 
-def swept(subject: Subject, over: o.Range, run: o.SweepOptions) -> tuple[Any, Answer]:
-    """The data set of a sweep, and the answer about it."""
-    speeds = subject.range(over, subject.usual(251, 13))
+def swept(subject: Subject, speeds: Any, run: o.RunOptions) -> tuple[Any, Answer]:
+    """The data set of a sweep over speeds [rad/s], and the answer about it."""
     found = jc.sweep(subject.model, speeds, **run.settings, progress=partial(report, "sweep"))
     jc.show.require_some(found)
     zones, title = zones_of(found), f"{subject.name}, {jc.analysis.length(found)}"
@@ -136,8 +137,12 @@ def said_of(found: Any, zones: Any) -> str:
 
 
 def chances(subject: Subject, over: o.Range, draws: int, seed: int, run: o.RunOptions) -> Answer:
-    """Chances of chaos by speed, of a file with ranges."""
-    found = draw(subject, over, draws, seed, run)
+    """Chances of chaos by speed, of a file with ranges: motions of draws, of at most 100 revolutions after 100."""
+    most = jc.design.REVOLUTIONS
+    length: dict[str, Any] = {name: min(getattr(run, name) or most, most) for name in ("discard", "revolutions")}
+    length |= {"blocks": o.blocks_of(length["revolutions"]), "draws": draws, "seed": seed, "method": run.method}
+    given = subject.model, subject.unknowns, subject.range(over, 40)
+    found = jc.design.ensemble(*given, **length, progress=partial(report, "draws"))
     if found.failed.all():
         raise NoResult(f"All {found.failed.size} simulations failed: try more steps (--steps), or narrower ranges.")
     columns = subject.speed_columns(found.speed)
@@ -146,15 +151,6 @@ def chances(subject: Subject, over: o.Range, draws: int, seed: int, run: o.RunOp
     tables, notes = jc.show.chances_tables(subject.name, found, subject.beside), jc.show.chances_notes(found)
     document, files = jc.show.chances_document(found), {"figure": figure, "data": columns}
     return Answer(jc.show.chances_answer(found), tables, notes, document, files, by_ranges=True)
-
-
-def draw(subject: Subject, over: o.Range, draws: int, seed: int, run: o.RunOptions) -> Any:
-    """The motions of draws from the ranges of a file over speed, of at most 100 revolutions after 100."""
-    most = jc.design.REVOLUTIONS
-    length: dict[str, Any] = {name: min(getattr(run, name) or most, most) for name in ("discard", "revolutions")}
-    length |= {"blocks": o.blocks_of(length["revolutions"]), "draws": draws, "seed": seed, "method": run.method}
-    given = subject.model, subject.unknowns, subject.range(over, 40)
-    return jc.design.ensemble(*given, **length, progress=partial(report, "draws"))
 
 
 def poincare(
@@ -250,7 +246,6 @@ def runup(
         windows: Parts into which each ramp is cut at least; each has an even number of revolutions.
         discard: Revolutions at the first speed before the ramp begins.
     """
-    subject = subject.under(load)
     settle = subject.usual(100, 10) if discard is None else discard
     given = {"windows": windows or subject.usual(100, 24), "settle": settle, "method": steps.method}
     found = jc.lanes.ramp_up_down(subject.model, *subject.ends(over), subject.rate(rate), **given)

@@ -35,7 +35,7 @@ class Subject:
     """Path of the file as it was given."""
 
     @property
-    def own(self) -> str:
+    def own(self) -> Any:
         """Whose speed the model's is: `cage` or `shaft`."""
         return self.model.speed_text.split()[0]
 
@@ -150,27 +150,22 @@ class Subject:
         if self.with_rollers:
             raise InputError(f"Command {command} takes a cage, but {self.name} is a bearing with its rollers.")
 
-    def document(self, by_ranges: bool) -> dict[str, Any]:
-        """Entries of the case in every document; best guesses only where these were taken."""
+    def about(self, by_ranges: bool) -> tuple[dict[str, Any], list[str]]:
+        """Entries of the case in every document, and sentences about it; best guesses only where these were taken."""
         from .._parameters import readings_of  # loads JAX
 
-        found: dict[str, Any] = {"readings": {name: chosen for name, (chosen, _) in readings_of(self.model).items()}}
-        found |= {} if self.shaft is None else {"cage_speed_ratio": 1 / self.shaft}
-        found |= {"load_N": float(self.model.load)} if self.with_rollers else {}
-        if self.file is not None:
-            guesses = [] if by_ranges else [u.label for u in self.unknowns]
-            found |= {"left_as_in_template": self.file.left, "best_guesses": guesses}
-        return found
-
-    def notes(self, by_ranges: bool) -> list[str]:
-        """Sentences about the readings, the template's values and the best guesses of the case."""
-        said, readings = self.document(by_ranges), jc.show.readings_words(self.model)
-        each = {
-            "Readings": [readings] if readings else [],
-            "As the template has them, of another bearing": said.get("left_as_in_template"),
-            "Best guesses of values known within ranges only": said.get("best_guesses"),
+        left = () if self.file is None else self.file.left
+        guesses = [] if by_ranges else [u.label for u in self.unknowns]
+        document: dict[str, Any] = {"readings": {name: way for name, (way, _) in readings_of(self.model).items()}}
+        document |= {} if self.shaft is None else {"cage_speed_ratio": 1 / self.shaft}
+        document |= {"load_N": float(self.model.load)} if self.with_rollers else {}
+        document |= {} if self.file is None else {"left_as_in_template": left, "best_guesses": guesses}
+        notes = {
+            "Readings": [*filter(None, [jc.show.readings_words(self.model)])],
+            "As the template has them, of another bearing": left,
+            "Best guesses of values known within ranges only": guesses,
         }
-        return [f"{what}: {', '.join(values)}" for what, values in each.items() if values]
+        return document, [f"{what}: {', '.join(values)}" for what, values in notes.items() if values]
 
 
 def read_case(given: str) -> Subject:

@@ -106,8 +106,11 @@ def _of_a_case(call: functools.partial[Answer], show: ShowOptions) -> Answer:
     """The answer of a command about a case, with its files; nothing is computed that cannot be written."""
     from ..files import check_writable
 
-    began, command = time.perf_counter(), call.func.__name__.rstrip("_")
-    cases = {name: read_case(call.keywords[name]) for name in ("subject", "other") if name in call.keywords}
+    began, command, given = time.perf_counter(), call.func.__name__.rstrip("_"), call.keywords
+    cases = {name: read_case(given[name]) for name in ("subject", "other") if name in given}
+    if call.func is not case.statics:  # which takes the load of a cage, too
+        load = given["means"].load if "means" in given else given.get("load")
+        cases["subject"] = cases["subject"].under(load)
     check_writable(show.out)
     with progress(f"{command} {cases['subject'].name}"):
         answer = call(**cases)

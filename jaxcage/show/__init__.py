@@ -17,8 +17,7 @@
 | `design_tables`    | designs before and after a search, shares of variance, tolerances     |
 | `chance_tables`    | chances of chaos, ranges that measurements narrowed                   |
 | `operating`        | operating speeds and their place among the zones                      |
-| `findings`         | everything that a report shows, computed                              |
-| `report`           | the report as HTML, made of sections                                  |
+| `report`           | answers of commands as one page of HTML                               |
 """
 
 from .chance_tables import (
@@ -62,7 +61,6 @@ from .diagrams import (
     quantities_beside as quantities_beside,
     sweep_figure as sweep_figure,
 )
-from .findings import Findings as Findings, examine as examine, require_some as require_some
 from .maps import (
     Axis as Axis,
     curves_table as curves_table,
@@ -72,7 +70,13 @@ from .maps import (
     stability_map as stability_map,
     top_exponent as top_exponent,
 )
-from .operating import Operating as Operating, read_operating as read_operating
+from .operating import (
+    Operating as Operating,
+    assess as assess,
+    calmest as calmest,
+    read_operating as read_operating,
+    verdict_table as verdict_table,
+)
 from .orbit_figures import (
     multiplier_circle as multiplier_circle,
     orbit_diagram_with_branches as orbit_diagram_with_branches,
@@ -81,6 +85,7 @@ from .parameter_tables import (
     differences as differences,
     differences_table as differences_table,
     readings_words as readings_words,
+    sources_table as sources_table,
 )
 from .quantity_tables import (
     column_of as column_of,
@@ -90,7 +95,7 @@ from .quantity_tables import (
     run_tables as run_tables,
     statics_table as statics_table,
 )
-from .report import page as page, verdict_table as verdict_table
+from .report import PAPER as PAPER, Section as Section, page as page, settings_table as settings_table
 from .run_figures import (
     load_bars as load_bars,
     rollers_of as rollers_of,
@@ -117,6 +122,7 @@ from .zone_tables import (
     loss_table as loss_table,
     motion_tables as motion_tables,
     point_record as point_record,
+    require_some as require_some,
     stretch_table as stretch_table,
     unsettled_notes as unsettled_notes,
     zone_span as zone_span,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from .._errors import ArgumentError
 from ..orbits import Sensitivity
@@ -180,7 +181,7 @@ def calm_figure(found: "Design", operating: tuple[float, float], title: str = ""
         values = [step["cost"] for step in found.path]
         ax.plot(np.arange(1, len(values) + 1), values, "o-", color=BLUE, markersize=3)
         ax.set(xlabel="Design solved for", ylabel="Cost")
-        ax.xaxis.get_major_locator().set_params(integer=True)
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
 
     figure = style.panels([ranges, costs], 2, (11.0, 3.6), title, width_ratios=(1.6, 1.0))
     style.legend_below(figure)

@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
 from matplotlib.transforms import offset_copy
 
-from ..analysis import CHAOS_THRESHOLD, Stretch, Zone, Zones, failed
+from ..analysis import CHAOS_THRESHOLD, Stretch, Zones, failed
 from ..bearing import PublishedCase
 from ..quantities import quantity
 from . import style
 from .quantity_tables import column_of, mean_over_starts
-from .zone_tables import published_zones, zone_span
+from .zone_tables import zone_span
 
 
 Span = tuple[float, float]
@@ -127,40 +127,6 @@ def mark_operating(ax: Axes, spans: Sequence[Span]) -> None:
             ax.axvline(edge, color=style.PURPLE, linewidth=1.1, linestyle=(0, (6, 2)), zorder=2)
         ax.axvspan(first, last, color=style.PURPLE, alpha=0.12, linewidth=0, zorder=0.5)
     ax.set_xlim(low, high)
-
-
-def zone_strip(
-    loss: Sequence[Zone],
-    chaotic: Sequence[Zone],
-    limits_rpm: Span,
-    operating: Sequence[Span] = (),
-    published: PublishedCase | None = None,
-    ax: Axes | None = None,
-) -> Axes:
-    """One row of bars for each kind of zone, with operating speeds marked through all rows.
-
-    **Arguments:** synchronous-loss and chaotic zones; ends of the sweep, operating speeds and ranges [rpm]; the
-    published case; axes. An open zone reaches to the end of the axis.
-    """
-    low, high = limits_rpm
-    rows: list[tuple[str, str, list[Span]]] = []
-    for name, colour, zones in (("synchronous loss", style.BLUE, loss), ("chaotic", style.VERMILION, chaotic)):
-        rows.append((name, colour, [zone_span(zone, low, high) for zone in zones]))
-    if published is not None:
-        ends = [(first, high if last is None else last) for first, last in published_zones(published)]
-        rows.append(("published", style.GREY, [(first, last) for first, last in ends if last > first]))
-    ax = style.axes_or_new(ax, 9.5, 0.9 + 0.42 * len(rows))
-    for i, (_, colour, spans) in enumerate(rows):
-        ax.barh(i, high - low, left=low, height=0.62, color=style.GREY, alpha=0.13, linewidth=0)
-        for first, last in spans:
-            ax.barh(i, last - first, left=first, height=0.62, color=colour, linewidth=0)
-    ax.set(xlim=limits_rpm, ylim=(len(rows) - 0.5, -0.5))
-    mark_operating(ax, operating)
-    ax.set_yticks(range(len(rows)), [name for name, _, _ in rows])
-    ax.tick_params(axis="y", length=0)
-    ax.grid(False, axis="y")
-    ax.spines[["left"]].set_visible(False)
-    return label_speed(ax)
 
 
 def reported(sweep: xr.Dataset, wanted: Sequence[str]) -> list[str]:

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import xarray as xr
@@ -12,6 +12,8 @@ from .._errors import ArgumentError
 from ..analysis import Edge, Stretch, Zone, Zones, failed
 from ..files import SpeedOf, Whose, own_rpm, split_owner, to_si
 from ..models import AbstractForcedSystem
+from ..orbits import SynchronousOrbits
+from .tables import Column, Table, table
 from .zone_tables import zone_span
 
 
@@ -30,10 +32,6 @@ class Operating:
     def __str__(self) -> str:
         ends = dict.fromkeys((f"{self.low_rpm:.0f}", f"{self.high_rpm:.0f}"))
         return f"{' to '.join(ends)} rpm"
-
-    def of_shaft(self, cage_speed_ratio: float) -> "Operating":
-        """Speeds of the shaft that go with speeds of the cage."""
-        return Operating(self.low_rpm / cage_speed_ratio, self.high_rpm / cage_speed_ratio)
 
 
 def read_operating(text: str, model: AbstractForcedSystem, unsaid: Whose | None = None) -> tuple[Operating, ...]:
@@ -113,6 +111,53 @@ def motion_verdict(at: Operating, stretches: Sequence[Stretch], sweep: xr.Datase
     motions = dict.fromkeys(" or ".join(s.labels).replace("_", " ") for s in met)
     state = "chaotic" if any(s.chaotic for s in met) else "clear"
     return _beyond(at, sweep["rpm"].values) or Verdict(state, ", ".join(motions))
+
+
+def assess(
+    operating: Sequence[Operating],
+    sweep: xr.Dataset,
+    found: Zones | Sequence[Stretch],
+    orbits: SynchronousOrbits | None = None,
+    loss: Sequence[Zone] = (),
+) -> list[tuple[Operating, dict[str, Verdict]]]:
+    """Each operating speed with the verdicts on it by kind of zone.
+
+    **Arguments:** operating speeds; a sweep and its zones or stretches; synchronous orbits and the zones without a
+    stable one.
+    """
+    if not isinstance(found, Zones):
+        return [(at, {"motion": motion_verdict(at, found, sweep)}) for at in operating]
+    verdicts: list[tuple[Operating, dict[str, Verdict]]] = []
+    for at in operating:
+        each = {"chaotic": chaotic_verdict(at, found, sweep)}
+        if orbits is not None:
+            searched = orbits.lower_rpm, orbits.upper_rpm, bool(orbits.stretches)
+            each = {"synchronous-loss": loss_verdict(at, loss, *searched)} | each
+        verdicts.append((at, each))
+    return verdicts
+
+
+def verdict_table(name: str, assessed: Sequence[tuple[Operating, dict[str, Verdict]]]) -> Table:
+    """Operating speeds with the verdicts on them."""
+    rows = [
+        vars(v) | {"speed": str(at), "kind": kind, "verdict": v.state}
+        for at, verdicts in assessed
+        for kind, v in verdicts.items()
+    ]
+    away = [Column("away [rpm]", "distance_rpm", digits=0), Column("away [%]", "percent", digits=1)]
+    close = f"close: an edge within {100 * CLOSE:g} % of the speed or within its own uncertainty"
+    title = f"Operating speeds of {name} beside its zones ({close})"
+    return table(title, rows, ["speed", "kind", "verdict", "where", Column("nearest edge", "edge"), *away])
+
+
+def calmest(zones: Iterable[Zone], first: float, last: float) -> tuple[float, float] | None:
+    """The widest range between two speeds [rpm] outside of all zones; None if there is none."""
+    free, at = [], first
+    for low, high in sorted(zone_span(zone, first, last) for zone in zones):
+        free.append((at, low))
+        at = max(at, high)
+    low, high = max([*free, (at, last)], key=lambda pair: pair[1] - pair[0])
+    return (low, high) if high > low else None
 
 
 def _beyond(at: Operating, rpm: np.ndarray) -> Verdict | None:

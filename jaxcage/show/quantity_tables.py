@@ -69,7 +69,9 @@ def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Tab
     words = lambda q: q.text if len(q.text) <= LONGEST else head_of(q.name, q.unit)
     tables = [_values_table(title, ((words(q), value, q.unit, error) for q, value, error in found.values()))]
     columns = [Column("order of the cage's speed", "order", digits=3), "amplitude"]
-    for name, spectrum in {} if rollers is None else rollers.spectra.items():
+    if rollers is None:
+        return tables
+    for name, spectrum in rollers.spectra.items():
         lines = map(vars, named_lines(spectrum, rollers.orders))
         tables.append(table(f"Spectrum, {SPECTRA[name]}", lines, [*columns, Column("at the frequency of", "name")]))
     return tables
@@ -77,7 +79,7 @@ def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Tab
 
 def _values_table(title: str, rows: Iterable[tuple[str, Any, str, float | None]]) -> Table:
     """A table of quantities: words, value [SI], SI unit, standard error."""
-    records = [dict(zip(("quantity", "value", "unit", "error"), row, strict=True)) for row in rows]
+    records = [{"quantity": words, "value": x, "unit": unit, "error": error} for words, x, unit, error in rows]
     return table(title, records, ["quantity", Column("value", unit=OWN, error="error"), UNIT])
 
 
@@ -95,7 +97,7 @@ def displacements(model: Any, shared: LoadDistribution) -> dict[str, float]:
 def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed: float | None = None) -> Table:
     """Loads and displacements at rest, and the kinematics at a shaft speed [rad/s] if one is given."""
     bearing = model.bearing
-    rows = [
+    rows: list[tuple[str, Any, str]] = [
         ("largest roller load", shared.max_load, "N"),
         ("shift of the shaft", shared.shaft_shift, "m"),
         ("elastic approach", shared.elastic_approach, "m"),

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..analysis import Stretch as Motion, Zone, Zones, lives_in_words
+from .._errors import NoResult
+from ..analysis import Stretch as Motion, Zone, Zones, failed, lives_in_words, outcomes
 from ..bearing import PublishedCase
 from ..orbits import LossZones, Point, Stretch, SynchronousOrbits
 from .tables import Beside, Column, Table, chosen, number, speed_columns, table
@@ -15,6 +16,13 @@ from .tables import Beside, Column, Table, chosen, number, speed_columns, table
 
 ENDS = ("onset", "exit")
 Span = tuple[float, float | None]
+
+
+def require_some(found: xr.Dataset, where: str = "") -> None:
+    """**Raises:** `NoResult` if every lane failed, with their number, `where`, and how they ended."""
+    if failed(found).all():
+        said = f"All {found['label'].size} simulations{where} failed ({', '.join(sorted(outcomes(found)))})"
+        raise NoResult(f"{said}: try more steps (--steps).")
 
 
 def published_zones(published: PublishedCase | None) -> list[Span]:
@@ -175,10 +183,10 @@ def _stretch_record(stretch: Stretch, found: SynchronousOrbits) -> dict[str, Any
     return record
 
 
-def edge_table(found: SynchronousOrbits, loss: LossZones, beside: Beside = None, named: bool = False) -> Table:
-    """Bifurcations at which a stable synchronous orbit begins or ends; with `named` those that bound a zone."""
+def edge_table(found: SynchronousOrbits, loss: LossZones, beside: Beside = None) -> Table:
+    """Bifurcations at which a stable synchronous orbit begins or ends."""
     names = {id(point): name for name, point in loss.edges.items()}
-    rows = [point_record(p, found, names.get(id(p))) for p in found.edges if not named or id(p) in names]
+    rows = [point_record(p, found, names.get(id(p))) for p in found.edges]
     for row in rows:
         both = f" ± {row['multiplier'][1]:.4f}i" if row["kind"] == "Neimark-Sacker" else ""
         row["critical"] = f"{row['multiplier'][0]:.4f}{both}"
