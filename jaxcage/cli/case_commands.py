@@ -1,5 +1,6 @@
 """Commands about the case itself: its file, its statics, a report."""
 
+import dataclasses
 import shlex
 import time
 from functools import partial
@@ -110,59 +111,46 @@ def report(
     at = jc.show.read_operating(operating, subject.model, subject.speeds)
     if operating and not at:
         raise InputError(f"Option --operating must hold a speed, but '{operating}' was given.")
-    began, sections, orbits, loss = time.perf_counter(), [], None, ()
+    began, said, orbits, loss = time.perf_counter(), [], None, ()
     speeds = subject.range(over, subject.usual(126 if quick else 251, 5 if quick else 13))
     found, answer = swept(subject, speeds, run)
     zones, limits = zones_of(found), (float(found["rpm"][0]), float(found["rpm"][-1]))
-    said = []
     if subject.with_rollers:
-        sections += [("Over speed", answer), *(_at_one_speed(subject, at[0], quick) if at else [])]
+        parts = [("Over speed", answer), *(_at_one_speed(subject, at[0], quick, run) if at else [])]
     else:
-        orbits = jc.orbits.synchronous_orbits(
-            subject.model, speeds[0], speeds[-1], settled=found, method=run.method, progress=tell
-        )
+        ends, told = (float(speeds[0]), float(speeds[-1])), {"method": run.method, "progress": tell}
+        orbits = jc.orbits.synchronous_orbits(subject.model, *ends, settled=found, **told)
         answer, zones, slopes = explained(subject, found, orbits, answer, quick, run.method)
-        sections += [("Zones", answer), *_of_orbits(subject, orbits, slopes, quick, run.method)]
         loss = jc.loss_zones(orbits).zones
+        parts = [("Zones", answer), *_of_orbits(subject, ends, orbits, slopes, quick, run.method)]
         if calm := jc.show.calmest((*zones.zones, *zones.transient, *loss), *limits):
             said.append(f"The widest range outside all zones goes from {calm[0]:.0f} to {calm[1]:.0f} rpm.")
     if subject.unknowns and draws:
         chance = chances(subject, o.Range(over.first, over.last), draws, seed, run)
-        sections.insert(0, ("What is known, and what it decides", chance))
+        parts.insert(0, ("What is known, and what it decides", chance))
         said.append(f"All zones of this page are those of the best guesses. {chance.sentence}")
     if float(getattr(subject.model, "load", 0.0)) > 0:
-        sections.append(("Statics", statics(subject)))
+        parts.append(("Statics", statics(subject)))
     assessed = jc.show.assess(at, found, zones, orbits, loss)
-    verdicts = [jc.show.verdict_table(subject.name, assessed)] if at else []
+    verdicts = [jc.show.verdict_table(subject.name, assessed, subject.beside)] if at else []
     each = [f"{where}: {v.state} ({kind})" for where, by in assessed for kind, v in by.items()]
     table, left = (None, ()) if subject.file is None else (subject.file.table, subject.file.left)
-    summary = jc.show.Section(
-        "In short", [*each, answer.sentence, *said], tables=verdicts, notes=subject.about(False)[1]
-    )
-    source = jc.show.Section("The design", tables=[jc.show.sources_table(subject.model, table, left)])
-    made = jc.show.settings_table(found, time.perf_counter() - began)
-    html = jc.show.page(
-        f"{'Case ' * (subject.published is not None)}{subject.name}",
-        f"Cylindrical roller bearing, {limits[0]:.0f} to {limits[1]:.0f} rpm of the {subject.own}",
-        [
-            summary,
-            *(_section(*each) for each in sections),
-            source,
-            jc.show.Section("How it was computed", tables=[made], notes=[jc.show.PAPER]),
-        ],
-        sweep=found,
-        operating=at,
-        command=visible(shlex.join(_words(subject, operating, quick))),
-    )
+    notes, made = subject.about(False)[1], jc.show.settings_table(found, time.perf_counter() - began)
+    sections = [
+        jc.show.Section("In short", [*each, answer.sentence, *said], tables=verdicts, notes=notes),
+        *(_section(*part) for part in parts),
+        jc.show.Section("The design", tables=[jc.show.sources_table(subject.model, table, left)]),
+        jc.show.Section("How it was computed", tables=[made], notes=[jc.show.PAPER]),
+    ]
+    words = ["jaxcage", "report", Path(subject.path).name or subject.name]
+    words += [*(["--operating", operating] if operating else []), *(["--quick"] if quick else [])]
+    title = f"{'Case ' * (subject.published is not None)}{subject.name}"
+    subtitle = f"Cylindrical roller bearing, {limits[0]:.0f} to {limits[1]:.0f} rpm of the {subject.own}"
+    command = visible(shlex.join(words))
+    html = jc.show.page(title, subtitle, sections, sweep=found, operating=at, command=command)
     document = {"quick": quick, "bytes": len(html.encode())}
     document["operating"] = [vars(where) | by for where, by in assessed]
-    return Answer(f"{'; '.join(each) or answer.sentence}", [*verdicts], said, document, {"report": html})
-
-
-def _words(subject: Subject, operating: str, quick: bool) -> list[str]:
-    """The words of the command that makes this report."""
-    words = ["jaxcage", "report", Path(subject.path).name or subject.name]
-    return words + (["--operating", operating] if operating else []) + (["--quick"] if quick else [])
+    return Answer("; ".join(each) or answer.sentence, verdicts, said, document, {"report": html})
 
 
 def _section(title: str, answer: Answer) -> Any:
@@ -173,16 +161,17 @@ def _section(title: str, answer: Answer) -> Any:
     return jc.show.Section(title, [answer.sentence], figures, answer.tables, answer.notes)
 
 
-def _at_one_speed(subject: Subject, at: Any, quick: bool) -> list[tuple[str, Answer]]:
+def _at_one_speed(subject: Subject, at: Any, quick: bool, run: o.RunOptions) -> list[tuple[str, Answer]]:
     """A run of a bearing with its rollers at an operating speed, and slopes of means there."""
     speed = jc.files.SpeedOf((at.low_rpm + at.high_rpm) / 2, subject.own)
-    found = [(f"At {at}", simulate(subject, speed=speed, run=o.RunOptions(discard=20, revolutions=20)))]
-    means = o.MeanOptions(speed, discard=20, revolutions=20)
-    return found if quick else [*found, ("What moves the means", gradient(subject, means=means))]
+    run = dataclasses.replace(run, discard=20, revolutions=20)
+    found, means = simulate(subject, speed=speed, run=run), o.MeanOptions(speed, discard=20, revolutions=20)
+    slopes = [] if quick else [("What moves the means", gradient(subject, means=means))]
+    return [(f"At {at}", found), *slopes]
 
 
 def _of_orbits(
-    subject: Subject, orbits: Any, slopes: dict[str, Any], quick: bool, method: Any
+    subject: Subject, ends: tuple[float, float], orbits: Any, slopes: dict[str, Any], quick: bool, method: Any
 ) -> list[tuple[str, Answer]]:
     """Synchronous orbits, a map over speed and guidance gap, and elasticities of edges."""
     found, loss, axis = [], jc.loss_zones(orbits), jc.show.parameter_axis(subject.model, "guidance_gap")
@@ -191,7 +180,6 @@ def _of_orbits(
     edges = {} if quick else {name: edge for name, edge in loss.edges.items() if name in FOLLOWED}
     count, discard, revolutions = ((40, 7), 100, 60) if quick else ((80, 12), 250, 100)
     length = {"discard": discard, "revolutions": revolutions, "blocks": 1, "keep": 1, "method": method}
-    ends = float(jc.rpm(orbits.lower_rpm)), float(jc.rpm(orbits.upper_rpm))
     found.append(("Stability map", mapped(subject, ends, axis, count, edges, {}, length)))
     if trusted := [s for name, s in slopes.items() if s.trusted and name in loss.edges]:
         said = "Relative change of the edges, which are solved for, by that of a parameter that a designer can choose."

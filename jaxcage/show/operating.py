@@ -13,7 +13,7 @@ from ..analysis import Edge, Stretch, Zone, Zones, failed
 from ..files import SpeedOf, Whose, own_rpm, split_owner, to_si
 from ..models import AbstractForcedSystem
 from ..orbits import SynchronousOrbits
-from .tables import Column, Table, table
+from .tables import Beside, Column, Table, table
 from .zone_tables import zone_span
 
 
@@ -137,17 +137,21 @@ def assess(
     return verdicts
 
 
-def verdict_table(name: str, assessed: Sequence[tuple[Operating, dict[str, Verdict]]]) -> Table:
-    """Operating speeds with the verdicts on them."""
+def verdict_table(name: str, assessed: Sequence[tuple[Operating, dict[str, Verdict]]], beside: Beside = None) -> Table:
+    """Operating speeds, and those of the shaft, with the verdicts on them."""
+    other, ratio = beside or ("", math.nan)
     rows = [
-        vars(v) | {"speed": str(at), "kind": kind, "verdict": v.state}
+        vars(v)
+        | {"speed": str(at), other: str(Operating(ratio * at.low_rpm, ratio * at.high_rpm))}
+        | {"kind": kind, "verdict": v.state}
         for at, verdicts in assessed
         for kind, v in verdicts.items()
     ]
     away = [Column("away [rpm]", "distance_rpm", digits=0), Column("away [%]", "percent", digits=1)]
     close = f"close: an edge within {100 * CLOSE:g} % of the speed or within its own uncertainty"
+    columns = ["kind", "verdict", "where"]
     title = f"Operating speeds of {name} beside its zones ({close})"
-    return table(title, rows, ["speed", "kind", "verdict", "where", Column("nearest edge", "edge"), *away])
+    return table(title, rows, ["speed", *([other] if beside else []), *columns, Column("nearest edge", "edge"), *away])
 
 
 def calmest(zones: Iterable[Zone], first: float, last: float) -> tuple[float, float] | None:
