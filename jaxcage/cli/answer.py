@@ -41,7 +41,7 @@ class Answer:
     files: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """Key in the document -> a figure, columns of numbers, a data set or a text; or the path of one already written."""
     part: str = ""
-    """What is added to the name of the case in names of files."""
+    """Addition to the name of the case in names of files."""
     by_ranges: bool = False
     """True if the values that are known within ranges only were not taken at their best guesses."""
     failure: str = ""

@@ -81,11 +81,8 @@ def statics(
     }
     document |= {"load": force, "shaft_speed_rpm": shaft * RPM}
     document["cage_displacement"] = jc.show.displacements(model, found)
-    document["kinematics"] = {
-        "cage_speed_ratio": float(bearing.cage_speed_ratio),
-        "cage_speed": float(bearing.cage_speed(shaft)),
-        "roller_centrifugal_force": float(bearing.roller_centrifugal_force(shaft)),
-    }
+    kinematics = {name: float(getattr(bearing, name)(shaft)) for name in ("cage_speed", "roller_centrifugal_force")}
+    document["kinematics"] = {"cage_speed_ratio": float(bearing.cage_speed_ratio), **kinematics}
     said = f"{np.sum(loads > 0)} of {loads.size} rollers carry {force:g} N, the most loaded one {np.max(loads):.0f} N."
     figure = jc.show.drawn(partial(jc.show.load_bars, found), 7.0, 3.8, title)
     files = {"figure": figure, "data": {f"{name} [{heads[name]}]": x for name, x in data.items()}}

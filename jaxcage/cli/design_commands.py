@@ -12,6 +12,7 @@ import jaxcage as jc
 from .._errors import InputError
 from . import options as o
 from .answer import Answer
+from .orbit_commands import bars
 from .progress import report
 from .subject import RPM, Subject
 from .values import no_worse_balance, read_bounds, read_tolerances
@@ -61,17 +62,17 @@ def design(
 
     Args:
         cost: Price of a unit of manufacturing cost of a cage [rpm of chaotic speeds]; 1000 if left out.
-        wear: Of a bearing: weight of the wear over its present value; 1 if left out, as all weights are.
-        force: Of a bearing: weight of the peak forces on pockets and land.
-        impulse: Of a bearing: weight of the impulses of pockets and land.
-        power: Of a bearing: weight of the power lost.
-        slip: Of a bearing: weight of the slip of its cage.
-        balance: Of a bearing: weight of the balance grade of its cage.
+        wear: For a bearing: weight of the wear over its present value; 1 if left out, as all weights are.
+        force: For a bearing: weight of the peak forces on pockets and land.
+        impulse: For a bearing: weight of the impulses of pockets and land.
+        power: For a bearing: weight of the power lost.
+        slip: For a bearing: weight of the slip of its cage.
+        balance: For a bearing: weight of the balance grade of its cage.
         worse_balance: Let the cage be balanced worse than it is.
         search: Search for a design: slsqp or augmented with --operating, else surrogate, on simulations.
         searches: With --operating: searches, the first from the design itself.
-        steps: Of surrogate: steps of the search; 10 if left out, of a bearing 12.
-        batch: Of surrogate: designs of a step; 12 if left out, of a bearing 16.
+        steps: For surrogate: steps of the search; 10 if left out, of a bearing 12.
+        batch: For surrogate: designs of a step; 12 if left out, of a bearing 16.
     """
     d, model, bounds = jc.design, subject.model, read_bounds(vary, subject)
     notes = [] if worse_balance else no_worse_balance(model, bounds)
@@ -194,10 +195,10 @@ def sensitivity(
 ) -> Answer:
     """Shares of each parameter in the chaotic speeds over its range, and effect of tolerances on the exact edges.
 
-    Of a bearing with its rollers the same of a measure at one speed, such as its wear.
+    A bearing with its rollers gives the same for a measure at one speed, such as its wear.
 
     Args:
-        of: Of a bearing: measure, such as wear, power, slip or pocket_force_peak_N.
+        of: For a bearing: measure, such as wear, power, slip or pocket_force_peak_N.
         samples: Base samples of the Sobol indices, a power of 2; 64 if left out, of a bearing 32.
         tolerance: Tolerance of every parameter but constants, ± so many percent, uniformly distributed.
     """
@@ -223,8 +224,7 @@ def sensitivity(
         loss = jc.loss_zones(jc.orbits.synchronous_orbits(model, *subject.ends(over), progress=report))
         edges = [s for s in jc.orbits.sensitivities(model, loss.edges).values() if s.trusted]
         slopes = [(s, _not_fixed(model, s.elasticity)) for s in edges]
-        bars = partial(jc.show.elasticity_bars, jc.show.to_be_turned(model, edges))
-        files |= {"figure": jc.show.drawn(bars, 9.0, 2.2 + 1.2 * len(edges), name)} if edges else {}
+        files |= {"figure": bars(subject, edges)} if edges else {}
     deviation = tolerance / 100 / math.sqrt(3)
     budgets = [d.tolerance_budget(slope, dict.fromkeys(names, deviation)) for slope, names in slopes]
     most, what = max(shares.total, key=shares.total.__getitem__), subject.usual("chaotic speeds", of.replace("_", " "))

@@ -218,12 +218,12 @@ class MeanOptions:
 
 @dataclasses.dataclass(frozen=True)
 class CalmOptions:
-    """What a design of a cage must keep over an operating range."""
+    """Requirements that a design of a cage must keep over an operating range."""
 
     operating: OptionalText = None
     """Range of speed in which the machine runs, e.g. "31500-44000 rpm shaft"."""
     objective: Annotated[str, text("be cost or width", lambda x: x in ("cost", "width"))] = "cost"
-    """What is made small: cost, or the exact width of the unstable ranges within --operating."""
+    """The quantity to minimise: cost, or the exact width of the unstable ranges within --operating."""
     margin: Annotated[float, number("be at least 0 and below 50", lambda x: 0 <= x < 50)] = 10.0
     """Least distance of both ends of the range from the edges of the stable range, per cent of speed."""
     decay: Annotated[float | None, _ABOVE] = None

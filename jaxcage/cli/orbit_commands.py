@@ -29,7 +29,7 @@ def zones(
 ) -> Answer:
     """Chaotic zones beside the zones without a stable synchronous orbit, with exact edges and their gradients.
 
-    Of a bearing with its rollers stretches of speed with the same motion; of a file with ranges chances of chaos.
+    A bearing with its rollers gives stretches of speed with the same motion, a file with ranges chances of chaos.
     """
     if subject.unknowns and draws:
         return chances(subject, over, draws, seed, run)
@@ -142,7 +142,7 @@ def gradient(
     wear and power. Those have standard errors.
 
     Args:
-        lasting: Of zones of chaos that lasts, by survival regression (minutes).
+        lasting: Differentiate zones of chaos that lasts, by survival regression (minutes).
         zone: With --lasting: number of the zone, as `jaxcage sweep` counts them; 0 takes all.
         by: With --lasting or --speed: parameters, of which several joined by + change together.
         designs: With --lasting or --speed: designs around this one from which slopes are estimated.

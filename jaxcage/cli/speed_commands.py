@@ -80,7 +80,7 @@ def sweep(
 ) -> Answer:
     """Sweep over speed from several initial states: labels, exponents, chaotic zones; slips and losses of a bearing.
 
-    Of a file with ranges chances of chaos.
+    A file with ranges gives chances of chaos.
     """
     return (
         chances(subject, over, draws, seed, run)

@@ -106,7 +106,7 @@ def read_tolerances(text: str, subject: Subject, fastest: float) -> dict[str, An
 
 
 def _read_each(option: str, given: Sequence[str], form: str, read: Callable[[str, str], Any]) -> dict[str, Any]:
-    """What `read` makes of every `NAME=VALUES`, by name; its `ValueError` becomes a sentence about that name."""
+    """Read every `NAME=VALUES` by `read`, whose `ValueError` becomes a sentence about that name."""
     found: dict[str, Any] = {}
     for text in given:
         name, _, values = (part.strip() for part in text.replace("+-", "±").partition("="))

@@ -60,7 +60,7 @@ def range_words(found: Range, unit: str) -> str:
 
 
 def chances_answer(found: Ensemble) -> str:
-    """What the known values decide, and what to do about the rest, in a sentence."""
+    """A sentence that says what the known values decide, and what to do about the rest."""
     if count := int(np.sum(found.undecided)):
         said = f"Known values do not decide between calm and chaotic at {count} of {found.rpm.size} speeds."
         return f"{said} {measures_words(found.clues())}"

@@ -29,8 +29,8 @@ def changed_table(title: str, model: Any, found: Optimum | Design, vary: Mapping
 
 
 def requirement_table(title: str, found: Design, beside: Beside = None) -> Table:
-    """What a design must keep: the limit, the given design, the new one, the worst bearing within tolerances, and the
-    speed to which the new value belongs. A multiplier is shown as the revolutions in which a disturbance falls to 1/e.
+    """Requirements: the limit, the given design, the new one, the worst bearing within tolerances, and the speed to
+    which the new value belongs. A multiplier is shown as the revolutions in which a disturbance falls to 1/e.
     """
     rows: list[dict[str, Any]] = []
     for r in found.requirements:
@@ -59,7 +59,7 @@ def _reached(r: Requirement, each: Value) -> str:
 
 
 def stricter(found: Design) -> dict[str, float]:
-    """What a limit that is 10 % stricter costs, by requirement, of those that bind."""
+    """Cost of a limit that is 10 % stricter, by requirement, for those that bind."""
     limits, by = {r.name: r for r in found.requirements}, {}
     for name, price in found.prices.items():
         r = limits[name]

@@ -30,7 +30,7 @@ SPECTRA = {"cage_place": "Cage, vertical / clearance", "pocket_force": "Pockets,
 
 @dataclasses.dataclass(frozen=True)
 class Rollers:
-    """What a run of a bearing says of its rollers."""
+    """Rollers of a bearing during a run."""
 
     history: RollerHistory
     around: Around

@@ -65,9 +65,8 @@ def motion_tables(
     published: PublishedCase | None = None,
     beside: Beside = None,
 ) -> list[Table]:
-    """What a sweep says of speeds: chaotic zones, their edges and mean lives, zones of chaos that dies out, each if
-    there are any; or stretches of speed with the same labels.
-    """
+    """Chaotic zones, their edges and mean lives, zones of chaos that dies out, each if there are any; or stretches of
+    speed with the same labels."""
     if not isinstance(found, Zones):
         rows = [vars(each) | {"motion": " or ".join(each.labels)} for each in found]
         columns = [Column("from", "low_rpm", digits=0), Column("to", "high_rpm", digits=0), "motion"]
