@@ -20,7 +20,7 @@ from jaxcage.analysis import Zone, Zones, chaotic_share, resolution_rpm
 from jaxcage.bearing import PUBLISHED_CASES, PUBLISHED_SPEED_RANGE_RPM, PublishedCase, load_distribution
 from jaxcage.forces import PocketImpact, approach_speed, impact_history
 from jaxcage.orbits import LossZones, synchronous_orbits
-from jaxcage.show import Column, Table, rows_table, zone_span
+from jaxcage.show import Column, Table, table, zone_span
 
 
 ZONE_RANGE_RPM = (4000.0, 27500.0)
@@ -222,10 +222,10 @@ def reproduction(runs: Runs) -> tuple[dict[str, Any], list[Table], list[str]]:
     for e in edges:
         row = rows.setdefault((e["case"], e["edge"]), e | {"published": e["published_rpm"]})
         row[e["kind"]] = "none" if e["ours_rpm"] is None else f"{e['ours_rpm']:.0f} ({e['error_percent']:+.1f} %)"
-    columns = [Column("published", (), digits=0), *(Column(name, ()) for name in names)]
-    tables = [rows_table("Zones of 500 rpm and more, 4000 to 27500 rpm", wide, [Column("case", ()), *columns])]
-    columns, title = [Column("edge", ()), *columns], f"Published edges and ours [rpm], sweeps at {resolution:.0f} rpm"
-    tables.append(rows_table(title, rows.values(), [Column("case", ()), *columns]))
+    columns = [Column("published", digits=0), *names]
+    tables = [table("Zones of 500 rpm and more, 4000 to 27500 rpm", wide, ["case", *columns])]
+    columns, title = ["edge", *columns], f"Published edges and ours [rpm], sweeps at {resolution:.0f} rpm"
+    tables.append(table(title, rows.values(), ["case", *columns]))
     return document, tables, [*notes, *(f"{c['claim']} {c['verdict'].upper()}. {c['evidence']}" for c in checked)]
 
 

@@ -1,4 +1,4 @@
-"""Findings made by hand for the tests of the report: nothing is computed."""
+"""Results made by hand for the tests of the report: nothing is computed."""
 
 import json
 
@@ -8,10 +8,19 @@ from helpers import made_sweep
 
 import jaxcage as jc
 from jaxcage.analysis import zones
-from jaxcage.bearing import PUBLISHED_CASES, load_distribution
-from jaxcage.orbits import Branch, Curve, Point, Sensitivity, StableRange, SynchronousOrbits, loss_zones
-from jaxcage.show import Axis, Findings, Operating
-from jaxcage.show.findings import Orbits
+from jaxcage.bearing import PUBLISHED_CASES
+from jaxcage.orbits import Branch, Point, Sensitivity, StableRange, SynchronousOrbits, loss_zones
+from jaxcage.show import (
+    Section,
+    drawn,
+    elasticity_bars,
+    loss_table,
+    motion_tables,
+    multiplier_circle,
+    orbit_diagram_with_branches,
+    settings_table,
+    sweep_figure,
+)
 
 
 PER_RPM = np.pi / 30
@@ -77,44 +86,22 @@ def slopes(model: jc.CageModel, name: str, kind: str, rpm: float, turn: float) -
     return Sensitivity(name, kind, rpm, slope, change, balance, 0.1, "converged")
 
 
-def findings(name: str = "1a", quick: bool = False, operating: tuple[Operating, ...] = ()) -> Findings:
-    """Everything that a page shows, of a design whose zones are known."""
-    model = jc.case("1a")
-    sweep = swept()
-    found = orbits(sweep)
-    loss = loss_zones(found)
-    gaps, across = np.linspace(0.36e-3, 0.56e-3, 9), np.linspace(2500, 27500, 20) * PER_RPM
-    grid = 0.3 * np.sin(across[:, None, None, None] / PER_RPM / 3e3) * np.ones((1, 9, 1, 1))
-    line = np.linspace(7000, 8000, 9) * PER_RPM
-    curve = Curve(
-        name="zone 1 onset",
-        kind="fold",
-        x="speed",
-        y="guidance_gap",
-        x_value=line,
-        y_value=gaps,
-        state=np.zeros((9, 4)),
-        genuine=np.ones(9, dtype=bool),
-        ended=("range", "range"),
-        multipliers=np.zeros((9, 4), dtype=complex),
-    )
-    axes = ("speed", "guidance_gap", "start")
-    labels = np.where(grid[..., 0] > 0.02, "chaotic", "periodic-1")
-    mapped = xr.Dataset(
-        {"label": (axes, labels), "exponents": ((*axes, "exponent"), grid)}, {"speed": across, "guidance_gap": gaps}
-    )
-    axis = Axis("guidance_gap", gaps[0], gaps[-1], "m")
-    located = [] if quick else list(loss.edges.items())
-    edges = {n: slopes(model, n, p.kind, p.speed_rpm, 0.5 + i) for i, (n, p) in enumerate(located)}
-    return Findings(
-        name=name,
-        model=model,
-        published=PUBLISHED_CASES.get(name),
-        sweep=sweep,
-        operating=operating,
-        zones=zones(sweep),
-        orbits=Orbits(found, loss, edges, axis, mapped, [] if quick else [curve], {}, "by hand"),
-        statics=load_distribution(model.bearing, model.load),
-        quick=quick,
-        seconds={"sweep": 12.0, "synchronous orbits": 34.0},
-    )
+def sections(name: str = "1a") -> list[Section]:
+    """Answers about a design whose zones are known, as a page shows them."""
+    model, sweep = jc.case("1a"), swept()
+    found, known = orbits(sweep), zones(sweep)
+    edges = [slopes(model, n, p.kind, p.speed_rpm, 0.5 + i) for i, (n, p) in enumerate(loss_zones(found).edges.items())]
+    figures = {
+        "orbits": sweep_figure(sweep, known, PUBLISHED_CASES["1a"]),
+        "branches": drawn(lambda ax: orbit_diagram_with_branches(sweep, found.branches, ax)),
+        "multipliers": drawn(lambda ax: multiplier_circle(found.branches[0], ax)),
+        "elasticities": drawn(lambda ax: elasticity_bars(edges, ax)),
+    }
+    captions = {key: (figure, f"Figure about {key} of a design") for key, figure in figures.items()}
+    beside = ("shaft", 1 / RATIO)
+    tables = motion_tables(name, sweep, known, PUBLISHED_CASES["1a"], beside)
+    tables.append(loss_table(name, found, loss_zones(found), None, beside))
+    return [
+        Section("Zones", ["2 zones of chaos."], captions, tables),
+        Section("Settings", tables=[settings_table(sweep, 1.0)]),
+    ]

@@ -75,7 +75,6 @@ REFUSED = [
     ("identify 1a data.csv", "must be a TOML file with ranges"),
     ("report 1a --operating fast", "--operating must be speeds"),
     ("gradient 1a --speed 1e4", "--speed goes with a bearing"),
-    ("--tyro-print-completion nonsense", "'nonsense'"),
     # Whole bearings.
     ("bifurcations nu2310", "takes a cage"),
     ("sweep nu2310 --exponents 2", "--exponents must be at most 1"),

@@ -23,7 +23,7 @@ from jaxcage.files import (
     to_si,
     toml_text,
 )
-from jaxcage.show.sources import readings_words
+from jaxcage.show import readings_words
 
 
 # --- units -----------------------------------------------------------------------------------

@@ -22,8 +22,7 @@ from report_example import swept
 
 import jaxcage as jc
 from jaxcage.cli import main
-from jaxcage.cli.answer import _write
-from jaxcage.cli.options import ShowOptions
+from jaxcage.cli.answer import write
 from jaxcage.files import save_model, write_template
 from jaxcage.lanes import Grid, Run, Store, Study, load, open_study, run_study, save
 from jaxcage.show import new_figure, write_columns
@@ -54,7 +53,7 @@ def full_disk(room: int) -> Iterator[None]:
 def _figure(path: Path, n: int) -> Any:
     figure = new_figure(2.0, 2.0)
     figure.subplots().plot(np.sin(np.arange(10.0 * n)))
-    return _write(path, figure, ShowOptions(), None)
+    return write(path, figure)
 
 
 WRITERS: dict[str, Callable[[Path, int], Any]] = {

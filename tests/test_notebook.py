@@ -4,7 +4,7 @@ import html
 import re
 
 import pytest
-from report_example import findings, orbits, swept
+from report_example import orbits, slopes, swept
 
 import jaxcage as jc
 from jaxcage.orbits import loss_zones
@@ -12,7 +12,13 @@ from jaxcage.orbits import loss_zones
 
 SWEEP = swept()
 FOUND = orbits(SWEEP)
-RESULTS = [jc.zones(SWEEP), FOUND, loss_zones(FOUND), FOUND.branches[0], *findings().orbits.slopes.values()]
+RESULTS = [
+    jc.zones(SWEEP),
+    FOUND,
+    loss_zones(FOUND),
+    FOUND.branches[0],
+    slopes(jc.case("1a"), "zone 1 onset", "fold", 7000.0, 0.5),
+]
 
 
 @pytest.mark.parametrize("result", RESULTS[:5], ids=lambda result: type(result).__name__)

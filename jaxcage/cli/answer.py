@@ -12,13 +12,19 @@ from typing import TYPE_CHECKING, Any
 
 import jaxcage as jc
 
-from .options import ShowOptions
 from .progress import visible
 from .subject import Subject
 
 
 if TYPE_CHECKING:
     from ..show import Table
+
+ENDINGS = {"report": ".html", "file": ".toml"}
+"""Ends of the names of files that are texts."""
+USUAL = ("figure", "data", "curve_data", *ENDINGS)
+"""Keys of files whose names do not hold the key."""
+PLAIN = str.maketrans({"±": "+-", "µ": "u", "°": "deg ", "²": "^2", "³": "^3", "–": "-"})
+"""Plain characters in place of others, where standard output cannot show these."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,46 +38,50 @@ class Answer:
     notes: Sequence[str] = ()
     document: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """More for programs, in SI units unless a name ends in another one."""
-    subject: Subject | None = None
-    files: Mapping[str, tuple[str, Any]] = dataclasses.field(default_factory=dict)
-    """Key in the document -> end of the file's name, and a figure, columns of numbers, a data set or a text."""
-    stored: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    """Key in the document -> path of a file that is written already."""
+    files: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """Key in the document -> a figure, columns of numbers, a data set or a text; or the path of one already written."""
+    part: str = ""
+    """Addition to the name of the case in names of files."""
+    by_ranges: bool = False
+    """True if the values that are known within ranges only were not taken at their best guesses."""
     failure: str = ""
     """Sentence that is printed, with exit status 1, after the answer of something that failed."""
 
 
-def complete(answer: Answer, command: str, show: ShowOptions | None, seconds: float) -> Answer:
+def complete(answer: Answer, command: str, subject: Subject, out: str, seconds: float) -> Answer:
     """Write the files of an answer, and add what every command prints."""
-    written, subject, notes = dict(answer.stored), answer.subject, list(answer.notes)
-    document = {table.key: table.records for table in answer.tables if table.key} | dict(answer.document)
-    if show is not None:
-        stem = f"{command}_{subject.name}" if subject else command
-        for key, (ending, content) in answer.files.items():
-            written[key] = str(_write(Path(show.out) / f"{stem}{ending}", content, show, subject))
-    if subject is not None:
-        document, notes = {"case": subject.name} | document | subject.document, notes + subject.notes
-    if show is not None:
-        document["seconds"] = round(seconds, 2)
-        notes.append(f"Time: {seconds:.1f} s")
+    stem = Path(out) / f"{command}_{subject.name}{answer.part}"
+    written = {key: str(_written(key, content, stem, subject)) for key, content in answer.files.items()}
+    document = {"case": subject.name, **{table.key: table.records for table in answer.tables if table.key}}
+    about, notes = subject.about(answer.by_ranges)
+    document |= {**answer.document, **about, "seconds": round(seconds, 2), **written}
+    notes = [*answer.notes, *notes, f"Time: {seconds:.1f} s"]
     notes += [f"{key.replace('_', ' ').capitalize()}: {visible(path)}" for key, path in written.items()]
-    return dataclasses.replace(answer, document=document | written, notes=notes)
+    return dataclasses.replace(answer, document=document, notes=notes)
 
 
-def _write(path: Path, content: Any, show: ShowOptions, subject: Subject | None) -> Path:
-    """Write one file, whole or not at all."""
+def _written(key: str, content: Any, stem: Path, subject: Subject) -> Path:
     import xarray as xr
 
+    if isinstance(content, Path):
+        return content
+    path = stem if key in USUAL else stem.with_name(f"{stem.name}_{key}")
+    named = lambda ending: path.with_name(path.name + ending)
     if isinstance(content, xr.Dataset):
-        return jc.lanes.save(path, content)
+        return jc.lanes.save(named(".zarr"), content)
     if isinstance(content, Mapping):
-        return jc.show.write_columns(path, content)
+        return jc.show.write_columns(named(".csv"), content)
+    if not isinstance(content, str) and subject.shaft is not None:
+        jc.show.add_shaft_axes(content, 1 / subject.shaft)
+    return write(named(ENDINGS.get(key, ".png")), content)
+
+
+def write(path: Path, content: Any) -> Path:
+    """Write a text or a figure, whole or not at all."""
     with jc.files.replacing(path) as temporary:
         if isinstance(content, str):
             temporary.write_text(content, encoding="utf-8")
         else:
-            if subject is not None and subject.shaft is not None:
-                jc.show.add_shaft_axes(content, 1 / subject.shaft)
             content.savefig(temporary, dpi=content.dpi)
     return path
 
@@ -83,12 +93,16 @@ def print_answer(answer: Answer, as_json: bool) -> None:
     """
     if isinstance(sys.stdout, io.TextIOWrapper):  # names of files need not be text
         sys.stdout.reconfigure(errors="backslashreplace")
+    if as_json:
+        text = json.dumps(plain(answer.document), indent=2, allow_nan=False)
+    else:
+        text = "\n\n".join([answer.sentence, *map(str, answer.tables), "\n".join(answer.notes)])
     try:
-        if as_json:
-            print(json.dumps(plain(answer.document), indent=2, allow_nan=False))
-        else:
-            print("\n\n".join([answer.sentence, *map(str, answer.tables), "\n".join(answer.notes)]))
-        sys.stdout.flush()
+        text.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        text = text.translate(PLAIN)
+    try:
+        print(text, flush=True)
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or Python tries again at its end, and complains
         raise OSError(

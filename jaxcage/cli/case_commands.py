@@ -1,8 +1,11 @@
 """Commands about the case itself: its file, its statics, a report."""
 
+import dataclasses
 import shlex
+import time
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tyro
@@ -12,9 +15,14 @@ import jaxcage as jc
 from .._errors import InputError
 from . import options as o
 from .answer import Answer
-from .progress import visible
-from .speed_commands import draw, zone_tables
-from .subject import RPM, read_case
+from .orbit_commands import bars, explained, gradient, mapped, of_orbits
+from .progress import report as tell, visible
+from .speed_commands import chances, simulate, swept, zones_of
+from .subject import RPM, Subject
+
+
+FOLLOWED = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
+"""Edges that are followed across the map, which takes about a minute each."""
 
 
 def init(
@@ -31,16 +39,14 @@ def init(
         json: Print one JSON document on standard output.
     """
     written = jc.files.write_template(path, model)
-    what, first = (
-        ("an NU2310 with its rollers", "zones") if model == "bearing" else ("the NU2310 of case 1a", "statics")
-    )
+    what = "an NU2310 with its rollers" if model == "bearing" else "the NU2310 of case 1a"
     said = f"Written: {written}. It describes {what}: change the values and go on, e.g. with"
-    commands = [f"  jaxcage {command} {path}" for command in dict.fromkeys((first, "sweep", "zones", "report"))]
+    commands = [f"  jaxcage {command} {path}" for command in ("statics", "sweep", "zones", "report")]
     return Answer(said, notes=commands, document={"file": str(written)})
 
 
 def statics(
-    case: o.Case,
+    subject: o.Case,
     *,
     load: Annotated[float | None, o.number("be above 0 N", lambda x: x > 0, "N")] = None,
     shaft_speed: Annotated[float, o.number("be at least 0 rpm", lambda x: x >= 0, "rpm")] = 0.0,
@@ -52,47 +58,39 @@ def statics(
         load: Shaft load [N], or with a unit, e.g. "4.45 kN"; the case's own if left out.
         shaft_speed: Speed of the shaft [rpm], or with a unit or of the cage, e.g. "10000 rpm cage".
     """
-    subject = read_case(case)
     model, bearing, force = subject.model, subject.model.bearing, float(subject.model.load) if load is None else load
     if force <= 0:
         raise InputError(f"The load of {subject.name} must be above 0 N, but it is {force:g}: give one with --load.")
     ratio = float(bearing.cage_speed_ratio) if getattr(shaft_speed, "whose", "shaft") == "cage" else 1.0
     shaft = float(shaft_speed) / ratio / RPM
-    with show.computing(f"statics {subject.name}"):
-        found = jc.bearing.load_distribution(bearing, force, bearing.roller_centrifugal_force(shaft))
+    found = jc.bearing.load_distribution(bearing, force, bearing.roller_centrifugal_force(shaft))
     title, loads = f"{subject.name} at {force:g} N, shaft at {shaft * RPM:g} rpm", np.asarray(found.inner_loads)
-    columns = {
-        "angle": (found.roller_angles, "rad"),
-        "inner load": (loads, "N"),
-        "outer load": (found.outer_loads, "N"),
-    }
+    heads = {"angle": "rad", "inner load": "N", "outer load": "N"}
+    data = dict(zip(heads, map(np.asarray, (found.roller_angles, loads, found.outer_loads)), strict=True))
     rollers = [
-        jc.show.Column(name, np.asarray(x).tolist(), unit, key=name.replace(" ", "_"), digits=1)
-        for name, (x, unit) in columns.items()
+        {name.replace(" ", "_"): float(x) for name, x in zip(data, row, strict=True)}
+        for row in zip(*data.values(), strict=True)
     ]
+    columns = [jc.show.Column(name, name.replace(" ", "_"), unit, digits=1) for name, unit in heads.items()]
     tables = [
         jc.show.statics_table(f"Statics of {title}", model, found, shaft),
-        jc.show.Table("Rollers", rollers, "rollers"),
+        jc.show.table("Rollers", rollers, columns, "rollers"),
     ]
-    document = {n: float(getattr(found, n)) for n in ("max_load", "shaft_shift", "elastic_approach", "half_angle")}
-    document |= {
-        "load": force,
-        "shaft_speed_rpm": shaft * RPM,
-        "cage_displacement": jc.show.displacements(model, found),
+    document: dict[str, Any] = {
+        n: float(getattr(found, n)) for n in ("max_load", "shaft_shift", "elastic_approach", "half_angle")
     }
-    document["kinematics"] = {
-        "cage_speed_ratio": float(bearing.cage_speed_ratio),
-        "cage_speed": float(bearing.cage_speed(shaft)),
-        "roller_centrifugal_force": float(bearing.roller_centrifugal_force(shaft)),
-    }
+    document |= {"load": force, "shaft_speed_rpm": shaft * RPM}
+    document["cage_displacement"] = jc.show.displacements(model, found)
+    kinematics = {name: float(getattr(bearing, name)(shaft)) for name in ("cage_speed", "roller_centrifugal_force")}
+    document["kinematics"] = {"cage_speed_ratio": float(bearing.cage_speed_ratio), **kinematics}
     said = f"{np.sum(loads > 0)} of {loads.size} rollers carry {force:g} N, the most loaded one {np.max(loads):.0f} N."
-    figure = jc.show.drawn(lambda ax: jc.show.load_bars(found, ax), 7.0, 3.8, title)
-    data = {f"{name} [{unit}]": np.asarray(x) for name, (x, unit) in columns.items()}
-    return Answer(said, tables, [], document, subject, {"figure": (".png", figure), "data": (".csv", data)})
+    figure = jc.show.drawn(partial(jc.show.load_bars, found), 7.0, 3.8, title)
+    files = {"figure": figure, "data": {f"{name} [{heads[name]}]": x for name, x in data.items()}}
+    return Answer(said, tables, [], document, files)
 
 
 def report(
-    case: o.Case,
+    subject: o.Case,
     *,
     over: o.Range = o.Range(),
     operating: str = "",
@@ -107,29 +105,80 @@ def report(
     Args:
         operating: Speeds and ranges to assess, e.g. "8500, 12000-15000" [rpm], "900 rad/s" or "20000-24000 rpm shaft".
     """
-    subject = read_case(case)
     at = jc.show.read_operating(operating, subject.model, subject.speeds)
     if operating and not at:
         raise InputError(f"Option --operating must hold a speed, but '{operating}' was given.")
-    speeds, chances = subject.range(over, subject.usual(126 if quick else 251, 5 if quick else 13)), None
-    given = {"speeds": speeds, "operating": at, "quick": quick, "orbit_method": run.method, **run.settings}
-    with show.computing(f"report {subject.name}") as say:
-        found = jc.show.examine(subject.name, subject.model, subject.published, **given, progress=say)
-        if subject.unknowns and draws:
-            chances = draw(subject, subject.range(o.Range(over.first, over.last), 40), draws, seed, run, say)
-    words = ["jaxcage", "report", Path(case).name, *(["--operating", operating] if operating else [])]
-    command = visible(shlex.join([*words, *(["--quick"] if quick else [])]))
+    began, said, orbits, loss = time.perf_counter(), [], None, ()
+    speeds = subject.range(over, subject.usual(126 if quick else 251, 5 if quick else 13))
+    found, answer = swept(subject, speeds, run)
+    zones, limits = zones_of(found), (float(found["rpm"][0]), float(found["rpm"][-1]))
+    if subject.with_rollers:
+        parts = [("Over speed", answer), *(_at_one_speed(subject, at[0], quick, run) if at else [])]
+    else:
+        ends, told = (float(speeds[0]), float(speeds[-1])), {"method": run.method, "progress": tell}
+        orbits = jc.orbits.synchronous_orbits(subject.model, *ends, settled=found, **told)
+        answer, zones, slopes = explained(subject, found, orbits, answer, quick, run.method)
+        loss = jc.loss_zones(orbits).zones
+        parts = [("Zones", answer), *_of_orbits(subject, ends, orbits, slopes, quick, run.method)]
+        if calm := jc.show.calmest((*zones.zones, *zones.transient, *loss), *limits):
+            said.append(f"The widest range outside all zones goes from {calm[0]:.0f} to {calm[1]:.0f} rpm.")
+    if subject.unknowns and draws:
+        chance = chances(subject, o.Range(over.first, over.last), draws, seed, run)
+        parts.insert(0, ("What is known, and what it decides", chance))
+        said.append(f"All zones of this page are those of the best guesses. {chance.sentence}")
+    if float(getattr(subject.model, "load", 0.0)) > 0:
+        parts.append(("Statics", statics(subject)))
+    assessed = jc.show.assess(at, found, zones, orbits, loss)
+    verdicts = [jc.show.verdict_table(subject.name, assessed, subject.beside)] if at else []
+    each = [f"{where}: {v.state} ({kind})" for where, by in assessed for kind, v in by.items()]
     table, left = (None, ()) if subject.file is None else (subject.file.table, subject.file.left)
-    html = jc.show.page(found, table=table, command=command, chances=chances, left=left)
-    assessed = jc.show.assess(found)
-    tables = [jc.show.verdict_table(found)] if assessed else []
-    tables += [] if chances is None else jc.show.chances_tables(subject.name, chances, subject.beside)
-    each = [f"{where}: {v.state} ({kind})" for where, verdicts in assessed for kind, v in verdicts.items()]
-    document = {"quick": quick, "stages": found.seconds, "bytes": len(html.encode())}
-    document["operating"] = [{"low_rpm": x.low_rpm, "high_rpm": x.high_rpm, **verdicts} for x, verdicts in assessed]
-    notes = [f"Stages: {', '.join(f'{stage} {seconds:.0f} s' for stage, seconds in found.seconds.items())}"]
-    tables += zone_tables(subject, found.sweep, found.zones)
-    if (orbits := found.orbits) is not None:
-        tables.append(jc.show.loss_table(subject.name, orbits.found, orbits.loss, subject.published, subject.beside))
-    files = {"report": (".html", html)}
-    return Answer(f"{'; '.join(each) or 'The report is written'}.", tables, notes, document, subject, files)
+    notes, made = subject.about(False)[1], jc.show.settings_table(found, time.perf_counter() - began)
+    sections = [
+        jc.show.Section("In short", [*each, answer.sentence, *said], tables=verdicts, notes=notes),
+        *(_section(*part) for part in parts),
+        jc.show.Section("The design", tables=[jc.show.sources_table(subject.model, table, left)]),
+        jc.show.Section("How it was computed", tables=[made], notes=[jc.show.PAPER]),
+    ]
+    words = ["jaxcage", "report", Path(subject.path).name or subject.name]
+    words += [*(["--operating", operating] if operating else []), *(["--quick"] if quick else [])]
+    title = f"{'Case ' * (subject.published is not None)}{subject.name}"
+    subtitle = f"Cylindrical roller bearing, {limits[0]:.0f} to {limits[1]:.0f} rpm of the {subject.own}"
+    command = visible(shlex.join(words))
+    html = jc.show.page(title, subtitle, sections, sweep=found, operating=at, command=command)
+    document = {"quick": quick, "bytes": len(html.encode())}
+    document["operating"] = [vars(where) | by for where, by in assessed]
+    return Answer("; ".join(each) or answer.sentence, verdicts, said, document, {"report": html})
+
+
+def _section(title: str, answer: Answer) -> Any:
+    """An answer as a section of the page."""
+    from matplotlib.figure import Figure
+
+    figures = {name: (x, x.get_suptitle()) for name, x in answer.files.items() if isinstance(x, Figure)}
+    return jc.show.Section(title, [answer.sentence], figures, answer.tables, answer.notes)
+
+
+def _at_one_speed(subject: Subject, at: Any, quick: bool, run: o.RunOptions) -> list[tuple[str, Answer]]:
+    """A run of a bearing with its rollers at an operating speed, and slopes of means there."""
+    speed = jc.files.SpeedOf((at.low_rpm + at.high_rpm) / 2, subject.own)
+    run = dataclasses.replace(run, discard=20, revolutions=20)
+    found, means = simulate(subject, speed=speed, run=run), o.MeanOptions(speed, discard=20, revolutions=20)
+    slopes = [] if quick else [("What moves the means", gradient(subject, means=means))]
+    return [(f"At {at}", found), *slopes]
+
+
+def _of_orbits(
+    subject: Subject, ends: tuple[float, float], orbits: Any, slopes: dict[str, Any], quick: bool, method: Any
+) -> list[tuple[str, Answer]]:
+    """Synchronous orbits, a map over speed and guidance gap, and elasticities of edges."""
+    found, loss, axis = [], jc.loss_zones(orbits), jc.show.parameter_axis(subject.model, "guidance_gap")
+    if orbits.branches:
+        found.append(("The synchronous orbit", of_orbits(subject, orbits, loss)))
+    edges = {} if quick else {name: edge for name, edge in loss.edges.items() if name in FOLLOWED}
+    count, discard, revolutions = ((40, 7), 100, 60) if quick else ((80, 12), 250, 100)
+    length = {"discard": discard, "revolutions": revolutions, "blocks": 1, "keep": 1, "method": method}
+    found.append(("Stability map", mapped(subject, ends, axis, count, edges, {}, length)))
+    if trusted := [s for name, s in slopes.items() if s.trusted and name in loss.edges]:
+        said = "Relative change of the edges, which are solved for, by that of a parameter that a designer can choose."
+        found.append(("What moves the edges", Answer(said, files={"figure": bars(subject, trusted)})))
+    return found

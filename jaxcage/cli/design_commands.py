@@ -1,6 +1,5 @@
 """Commands about designs: better ones, tolerances, and values that are known within ranges only."""
 
-import dataclasses
 import math
 from functools import partial
 from typing import Annotated, Any
@@ -13,9 +12,10 @@ import jaxcage as jc
 from .._errors import InputError
 from . import options as o
 from .answer import Answer
-from .calm_design import calm_design
-from .subject import RPM, Subject, read_case
-from .values import no_worse_balance, read_bounds
+from .orbit_commands import bars
+from .progress import report
+from .subject import RPM, Subject
+from .values import no_worse_balance, read_bounds, read_tolerances
 
 
 DESIGNED = o.Range(4000.0, 27500.0)
@@ -26,10 +26,15 @@ Vary = Annotated[
         metavar="NAME=LOWER:UPPER", help="Parameter to change with its bounds, e.g. guidance_gap=0.3mm:0.6mm."
     ),
 ]
+VERDICTS = {
+    "calm": "Calm over {range}",
+    "stable, not checked": "Stable over {range}, not checked by simulations",
+    "stable, but not from every start": "Stable over {range}, but not from every initial state",
+}
 
 
 def design(
-    case: o.Case,
+    subject: o.Case,
     *,
     vary: Vary = (),
     over: o.Range = DESIGNED,
@@ -57,33 +62,30 @@ def design(
 
     Args:
         cost: Price of a unit of manufacturing cost of a cage [rpm of chaotic speeds]; 1000 if left out.
-        wear: Of a bearing: weight of the wear over its present value; 1 if left out, as all weights are.
-        force: Of a bearing: weight of the peak forces on pockets and land.
-        impulse: Of a bearing: weight of the impulses of pockets and land.
-        power: Of a bearing: weight of the power lost.
-        slip: Of a bearing: weight of the slip of its cage.
-        balance: Of a bearing: weight of the balance grade of its cage.
+        wear: For a bearing: weight of the wear over its present value; 1 if left out, as all weights are.
+        force: For a bearing: weight of the peak forces on pockets and land.
+        impulse: For a bearing: weight of the impulses of pockets and land.
+        power: For a bearing: weight of the power lost.
+        slip: For a bearing: weight of the slip of its cage.
+        balance: For a bearing: weight of the balance grade of its cage.
         worse_balance: Let the cage be balanced worse than it is.
         search: Search for a design: slsqp or augmented with --operating, else surrogate, on simulations.
         searches: With --operating: searches, the first from the design itself.
-        steps: Of surrogate: steps of the search; 10 if left out, of a bearing 12.
-        batch: Of surrogate: designs of a step; 12 if left out, of a bearing 16.
+        steps: For surrogate: steps of the search; 10 if left out, of a bearing 12.
+        batch: For surrogate: designs of a step; 12 if left out, of a bearing 16.
     """
-    subject, d = read_case(case, means.load), jc.design
-    model, bounds = subject.model, read_bounds(vary, subject)
+    d, model, bounds = jc.design, subject.model, read_bounds(vary, subject)
     notes = [] if worse_balance else no_worse_balance(model, bounds)
     search = search or ("surrogate" if calm.operating is None else "slsqp")
     if search not in (known := ("surrogate", *d.SEARCHES)):
         raise InputError(f"Option --search must be one of {', '.join(known)}, but '{search}' was given.")
     if search != "surrogate":
         if subject.with_rollers:
-            raise InputError(
-                f"Option --operating goes with a cage, whose orbits repeat, but {subject.name} is a bearing."
-            )
+            orbits = "goes with a cage, whose orbits repeat"
+            raise InputError(f"Option --operating {orbits}, but {subject.name} is a bearing.")
         if calm.operating is None:
             raise InputError(f"Option --search {search} goes with --operating.")
-        answer = calm_design(subject, bounds, calm, show, search=search, starts=searches, seed=seed)
-        return dataclasses.replace(answer, notes=[*notes, *answer.notes])
+        return _calm_design(subject, bounds, calm, notes, search=search, starts=searches, seed=seed)
     given = {"wear": wear, "force": force, "impulse": impulse, "power": power, "slip": slip, "balance": balance}
     prices = {name: 1.0 if price is None else price for name, price in given.items()}
     if subject.with_rollers and not sum(prices.values()):
@@ -91,31 +93,26 @@ def design(
     if wrong := [name for name, price in given.items() if price is not None and not subject.with_rollers]:
         raise InputError(f"Option --{wrong[0]} goes with a bearing with its rollers, but {subject.name} is a cage.")
     runs = _runs(subject, over, means, seed)
-    with show.computing(f"design {subject.name}") as say:
-        if subject.with_rollers:
-            objective, compared = d.bearing_objective(model, runs, prices), {}
-        else:
-            prices = {"cost": 1e3 if cost is None else cost}
-            ends = runs.speed[0] * RPM, runs.speed[-1] * RPM
-            objective, compared = (
-                d.chaotic_width(*ends, price=prices["cost"]),
-                {"chaotic speeds": d.chaotic_width(*ends)},
-            )
-        names = subject.usual((d.BALANCE, *d.LAND_LOADS), d.COMPARED)
-        compared |= {name: d.statistic(model, name) for name in names} | {d.OBJECTIVE: objective}
-        length = {"batches": steps or subject.usual(10, 12), "batch": batch or subject.usual(12, 16)}
-        values, finer = objective.values(runs), objective.values(runs.fresh(1, starts=4))
-        found = d.surrogate_search(
-            model, bounds, values, confirm=finer, **length, seed=seed, report=partial(say, "search")
-        )
-        say("fresh runs", 0, 1)
-        rows, failed = d.before_and_after(model, found.model, runs.fresh(2), compared)
+    if subject.with_rollers:
+        objective, compared = d.bearing_objective(model, runs, prices), {}
+    else:
+        prices, ends = {"cost": 1e3 if cost is None else cost}, (runs.speed[0] * RPM, runs.speed[-1] * RPM)
+        objective = d.chaotic_width(*ends, price=prices["cost"])
+        compared = {"chaotic speeds": d.chaotic_width(*ends)}
+    names = subject.usual((d.BALANCE, *d.LAND_LOADS), d.COMPARED)
+    compared |= {name: d.statistic(model, name) for name in names} | {d.OBJECTIVE: objective}
+    length = {"batches": steps or subject.usual(10, 12), "batch": batch or subject.usual(12, 16)}
+    values, finer = objective.values(runs), objective.values(runs.fresh(1, starts=4))
+    told = {"confirm": finer, "seed": seed, "report": partial(report, "search")}
+    found = d.surrogate_search(model, bounds, values, **length, **told)
+    report("fresh runs", 0, 1)
+    rows, failed = d.before_and_after(model, found.model, runs.fresh(2), compared)
     better = rows[-1].known and rows[-1].change < 0
     if any(row.name == "wear load" and row.change > 0 for row in rows):
         notes.append("This cage rubs more on its land than the given one, which counts nothing in the objective.")
-    values = ", ".join(f"{name} {value:.4g}" for name, value in found.values.items())
-    said = f"The search chose {values} (SI), but fresh runs do not tell that this is better."
-    said = f"A better design was found (SI): {values}." if better else said
+    chosen = ", ".join(f"{name} {value:.4g}" for name, value in found.values.items())
+    said = f"The search chose {chosen} (SI), but fresh runs do not tell that this is better."
+    said = f"A better design was found (SI): {chosen}." if better else said
     said = said if found.changed else "No better design was found: the given one stays."
     notes += [f"Search: {len(found.history)} steps, objective {found.objective:.4g}"]
     notes += [f"At a bound: {', '.join(found.at_bound) or 'no parameter'}", f"Fresh runs that failed: {failed}"]
@@ -125,8 +122,7 @@ def design(
         jc.show.before_and_after_table("Before and after, from the same initial states", rows),
         jc.show.changed_table(f"Design of {subject.name}", model, found, bounds),
     ]
-    files = {"figure": (".png", jc.show.optimum_figure(found, rows, subject.name))}
-    return Answer(said, tables, notes, document, subject, files)
+    return Answer(said, tables, notes, document, {"figure": jc.show.optimum_figure(found, rows, subject.name)})
 
 
 def _runs(subject: Subject, over: o.Range, means: o.MeanOptions, seed: int, progress: Any = None) -> Any:
@@ -140,8 +136,52 @@ def _runs(subject: Subject, over: o.Range, means: o.MeanOptions, seed: int, prog
     return jc.design.Runs(speeds, **length, progress=progress)
 
 
+def _calm_design(
+    subject: Subject, bounds: dict[str, Any], calm: o.CalmOptions, notes: list[str], **searches: Any
+) -> Answer:
+    """The design of a cage for calm operation over a range of speed."""
+    model, name = subject.model, subject.name
+    at = jc.show.read_operating(calm.operating or "", model, subject.speeds)
+    if len(at) != 1 or at[0].low_rpm == at[0].high_rpm:
+        raise InputError(f"Option --operating must be one range of speed, but '{calm.operating}' was given.")
+    low, high = at[0].low_rpm / RPM, at[0].high_rpm / RPM
+    film = None if calm.least_film is None else jc.files.to_si(calm.least_film, "m")
+    keep = jc.Requirements(calm.margin, calm.decay, film, calm.land_force, calm.grade, calm.drag)
+    tolerance = read_tolerances(calm.tolerance or "", subject, high)
+    given: dict[str, Any] = {"objective": calm.objective, "tolerance": tolerance, "check": calm.check}
+    best = jc.design_for(model, (low, high), bounds, keep, **given, **searches, progress=report)
+    tables = [jc.show.changed_table(f"Design of {name}", model, best, bounds)]
+    tables.append(jc.show.requirement_table("Requirements over the operating range", best, subject.beside))
+    if best.budget:
+        tables.append(jc.show.budget_of_tolerances_table(model, best))
+    what = {"cost": "Cost", "width": "Width of the unstable ranges [rpm]"}[calm.objective]
+    notes = [*notes, f"{what}: {best.cost_before:.4g} before, {best.cost:.4g} after"]
+    notes += [f"10 % stricter {name}: costs {price:.2g} more" for name, price in jc.show.stricter(best).items()]
+    notes += [f"A further step would lose an edge: {best.stopped_by}"] if best.stopped_by else []
+    notes += [f"On the way: {note}" for note in best.notes]
+    notes += [] if best.checked is None else [f"Checked: {best.checked} ({best.checked.method})"]
+    notes.append(f"Designs solved for: {best.evaluations}")
+    names = ("verdict", "checked", "cost", "cost_before", "prices", "conflict", "at_bound", "stopped_by")
+    document = {"optimum": best.values, "vary": bounds} | {name: getattr(best, name) for name in names}
+    document["operating_rpm"] = ends = at[0].low_rpm, at[0].high_rpm
+    said = _calm_sentence(best, f"{at[0]} of the {subject.own}", calm.objective)
+    return Answer(said, tables, notes, document, {"figure": jc.show.calm_figure(best, ends, name)})
+
+
+def _calm_sentence(best: Any, over: str, objective: str) -> str:
+    if not best.feasible:
+        short = ", ".join(f"{name} by {value:.3g}" for name, value in best.short.items()) or "an edge is lost"
+        against = f" In conflict: {' and '.join(best.conflict)}." if best.conflict else ""
+        return f"No design within the bounds keeps all requirements over {over}: short are {short}.{against}"
+    if objective == "width":
+        return f"Over {over} {best.cost:.0f} rpm are unstable, {best.cost_before:.0f} before."
+    said = VERDICTS[best.verdict].format(range=over)
+    coexists = "" if best.checked is None or best.checked.calm else f": {best.checked}"
+    return f"{said}, at a cost of {best.cost:.3g} (given design {best.cost_before:.3g}){coexists}."
+
+
 def sensitivity(
-    case: o.Case,
+    subject: o.Case,
     *,
     vary: Vary = (),
     over: o.Range = DESIGNED,
@@ -155,41 +195,36 @@ def sensitivity(
 ) -> Answer:
     """Shares of each parameter in the chaotic speeds over its range, and effect of tolerances on the exact edges.
 
-    Of a bearing with its rollers the same of a measure at one speed, such as its wear.
+    A bearing with its rollers gives the same for a measure at one speed, such as its wear.
 
     Args:
-        of: Of a bearing: measure, such as wear, power, slip or pocket_force_peak_N.
+        of: For a bearing: measure, such as wear, power, slip or pocket_force_peak_N.
         samples: Base samples of the Sobol indices, a power of 2; 64 if left out, of a bearing 32.
         tolerance: Tolerance of every parameter but constants, ± so many percent, uniformly distributed.
     """
-    subject, d = read_case(case, means.load), jc.design
-    model, name, bounds = subject.model, subject.name, read_bounds(vary, subject)
-    samples, files = samples or subject.usual(64, 32), {}
+    d, model, name, bounds, files = jc.design, subject.model, subject.name, read_bounds(vary, subject), {}
     if of not in d.BEARING_MEASURES:
         raise InputError(f"Option --of must be one of {', '.join(d.BEARING_MEASURES)}, but '{of}' was given.")
-    with show.computing(f"sensitivity {name}") as say:
-        runs, measured = _runs(subject, over, means, seed, partial(say, "designs")), d.BEARING_MEASURES[of]
-        ends = runs.speed[0] * RPM, runs.speed[-1] * RPM
-        value = d.statistic(model, measured) if subject.with_rollers else d.chaotic_width(*ends)
-        shares = d.global_sensitivity(model, bounds, value.blocks(runs), samples=samples, seed=seed)
-        slopes: list[tuple[Any, Any]] = []
-        if subject.with_rollers and not quick:
-            known = jc.parameters(model)
-            directions = [x for x in d.DIRECTIONS if all(float(known[each]) for each in x.split("+"))]
-            length = means.length(discard=10, revolutions=20)
-            near = d.Runs(runs.speeds, starts=2, **length, blocks=2, exponents=0, tolerance=1e-4)
-            spread = float(np.clip(tolerance / 100, 0.05, 0.3))
-            given = {"directions": directions, "spread": spread, "seed": seed}
-            found = d.mean_gradient(model, near, {of: value}, **given)
-            slopes = [(found.statistics[of], directions)]
-            files["figure"] = ".png", jc.show.statistic_bars(found, f"{name}: elasticities")
-        elif not quick:
-            ends = subject.range(o.Range(over.first, over.last), 2)
-            loss = jc.loss_zones(jc.orbits.synchronous_orbits(model, *ends, progress=say))
-            edges = [s for s in jc.orbits.sensitivities(model, loss.edges).values() if s.trusted]
-            slopes = [(s, jc.show.not_fixed(model, s.elasticity)) for s in edges]
-            bars = lambda ax: jc.show.elasticity_bars(jc.show.to_be_turned(model, edges), ax)
-            files |= {"figure": (".png", jc.show.drawn(bars, 9.0, 2.2 + 1.2 * len(edges), name))} if edges else {}
+    runs, measured = _runs(subject, over, means, seed, partial(report, "designs")), d.BEARING_MEASURES[of]
+    ends = runs.speed[0] * RPM, runs.speed[-1] * RPM
+    value = d.statistic(model, measured) if subject.with_rollers else d.chaotic_width(*ends)
+    given = {"samples": samples or subject.usual(64, 32), "seed": seed}
+    shares = d.global_sensitivity(model, bounds, value.blocks(runs), **given)
+    slopes: list[tuple[Any, Any]] = []
+    if subject.with_rollers and not quick:
+        known = jc.parameters(model)
+        directions = [x for x in d.DIRECTIONS if all(float(known[each]) for each in x.split("+"))]
+        length = means.length(discard=10, revolutions=20)
+        near = d.Runs(runs.speeds, starts=2, **length, blocks=2, exponents=0, tolerance=1e-4)
+        spread = float(np.clip(tolerance / 100, 0.05, 0.3))
+        found = d.mean_gradient(model, near, {of: value}, directions=directions, spread=spread, seed=seed)
+        slopes = [(found.statistics[of], directions)]
+        files["figure"] = jc.show.statistic_bars(found, f"{name}: elasticities")
+    elif not quick:
+        loss = jc.loss_zones(jc.orbits.synchronous_orbits(model, *subject.ends(over), progress=report))
+        edges = [s for s in jc.orbits.sensitivities(model, loss.edges).values() if s.trusted]
+        slopes = [(s, _not_fixed(model, s.elasticity)) for s in edges]
+        files |= {"figure": bars(subject, edges)} if edges else {}
     deviation = tolerance / 100 / math.sqrt(3)
     budgets = [d.tolerance_budget(slope, dict.fromkeys(names, deviation)) for slope, names in slopes]
     most, what = max(shares.total, key=shares.total.__getitem__), subject.usual("chaotic speeds", of.replace("_", " "))
@@ -199,17 +234,22 @@ def sensitivity(
     tables += [jc.show.budget_table(budget, tolerance) for budget in budgets]
     notes = [shares.warning] if shares.warning else []
     if shares.scatter:
-        notes.append(
-            f"Scatter of the motion is {100 * shares.scatter:.0f} % of the variance, in no parameter's own share."
-        )
+        scatter = f"Scatter of the motion is {100 * shares.scatter:.0f} % of the variance"
+        notes.append(f"{scatter}, in no parameter's own share.")
     notes += [f"Within twice the error, no effect: {', '.join(b.unclear)}" for b in budgets if b.unclear]
     document = {"vary": bounds, "of": what, "tolerance_percent": tolerance, "designs": shares.evaluations}
     document |= {"doubtful": shares.doubtful, "scatter": shares.scatter, "budgets": budgets}
-    return Answer(said, tables, notes, document, subject, files)
+    return Answer(said, tables, notes, document, files)
+
+
+def _not_fixed(model: Any, names: Any) -> list[str]:
+    """Parameters that have a tolerance: all but definitions, units and constants of nature and of the numerics."""
+    info = jc.parameter_info(model)
+    return [n for n in names if info[n].kind != "fixed" or n.startswith("extra.")]
 
 
 def identify(
-    case: o.Case,
+    subject: o.Case,
     measured: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="CSV")],
     *,
     draws: Annotated[int, o.count(16)] = 128,
@@ -226,29 +266,26 @@ def identify(
         draws: Draws from the ranges, in each stage.
         stages: Times that the ranges close around the best draws, at most.
     """
-    subject = read_case(case)
-    subject.require_ranges()
-    rows, info = (
-        jc.files.read_measurements(measured, subject.speeds, 1 / (subject.shaft or 1.0)),
-        jc.parameter_info(subject.model),
-    )
-    with show.computing(f"identify {subject.name}") as say:
-        told = {"method": steps.method, "progress": partial(say, "draws")}
-        missed = lambda place: jc.design.misses(subject.model, subject.unknowns, rows, place, **told)
-        found = jc.design.narrow(subject.unknowns, missed, draws=draws, stages=stages, seed=seed)
-    tables = [jc.show.measured_table(found, rows, subject.beside)]
+    model, unknowns = subject.model, subject.unknowns
+    if not unknowns:
+        example = 'such as stiffness = "1e4 .. 1e6 N/m"'
+        raise InputError(f"Case {subject.name} must be a TOML file with ranges, {example}, but has none.")
+    rows = jc.files.read_measurements(measured, subject.speeds, 1 / (subject.shaft or 1.0))
+    told = {"method": steps.method, "progress": partial(report, "draws")}
+    missed = lambda place: jc.design.misses(model, unknowns, rows, place, **told)
+    found = jc.design.narrow(unknowns, missed, draws=draws, stages=stages, seed=seed)
+    table, info = jc.show.measured_table(found, rows, subject.beside), jc.parameter_info(model)
     document = {name: getattr(found, name) for name in ("draws", "stages", "accepted")}
     if not found.accepted:
-        worst = max(tables[0].records, key=lambda row: row["off_by_tolerances"])
+        worst = max(table.records, key=lambda row: row["off_by_tolerances"])
         off = f"{worst['off_by_tolerances']:.2g} tolerances off in '{worst['what']}'"
         why = f"None of {found.draws} draws does what was measured in all rows: the nearest is {off}."
         why += " Widen ranges or tolerances, or look for what the model leaves out."
-        said, document = "No draw does what was measured.", document | {"file": None}
-        return Answer(said, tables, [], document, subject.certain, failure=why)
-    units = {u.label: info[u.names[0]].unit for u in subject.unknowns}
+        said = "No draw does what was measured."
+        return Answer(said, [table], [], document | {"file": None}, by_ranges=True, failure=why)
+    units = {u.label: info[u.names[0]].unit for u in unknowns}
     each = zip(found.unknowns, found.ranges, found.narrowed, strict=True)
     new = {u.label: (r, units[u.label]) for u, r, worth in each if worth}
-    text = jc.files.with_ranges(jc.files.read_bytes(case).decode(), new)
+    text = jc.files.with_ranges(jc.files.read_bytes(subject.path).decode(), new)
     said = f"{found.accepted} of {found.draws} draws of the last of {found.stages} stages do what was measured."
-    tables.insert(0, jc.show.narrowed_table(found, units))
-    return Answer(said, tables, [], document, subject.certain, {"file": (".toml", text)})
+    return Answer(said, [jc.show.narrowed_table(found, units), table], [], document, {"file": text}, by_ranges=True)

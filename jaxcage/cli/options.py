@@ -4,15 +4,18 @@ import contextlib
 import dataclasses
 import math
 import re
-from collections.abc import Callable, Iterator
-from typing import Annotated, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 from tyro.conf import arg
 from tyro.constructors import PrimitiveConstructorSpec
 
 from .. import _errors
-from .progress import Say, progress
+
+
+if TYPE_CHECKING:
+    from .subject import Subject
 
 
 MOST = 10_000_000
@@ -21,68 +24,12 @@ LARGEST = {"rpm": 1e6, "N": 1e7}
 """Largest speed and load."""
 SIDE = range(2, 10_001)
 """Points along one side of a map."""
-EXAMPLES = {"rpm": '"900 rad/s" or "20000 rpm shaft"', "N": '"4.45 kN"', "ms": '"600 us"'}
+EXAMPLES = {"rpm": '"900 rad/s" or "20000 rpm shaft"', "N": '"4.45 kN"'}
 
 
 def flag(name: str) -> str:
     """An option as it is written."""
     return "--" + name.replace("_", "-")
-
-
-def _option(metavar: str, read: Callable[[str], Any]) -> Any:
-    shown = lambda x: "by the model" if x is None else f"{x:g}" if isinstance(x, float) else str(x)
-    return PrimitiveConstructorSpec(
-        nargs=1,
-        metavar=metavar,
-        instance_from_str=lambda given: read(given[0]),
-        is_instance=lambda _: True,
-        str_from_instance=lambda x: [shown(x)],
-    )
-
-
-def read_quantity(text: str, unit: str) -> float:
-    """The number in a text, in `unit`, which a bare number has already; a speed may say whose it is.
-
-    **Raises:** `ValueError` with the words that follow the option's name.
-    """
-    with contextlib.suppress(ValueError):
-        return float(text)
-    if not unit:
-        raise ValueError(f'must be a number, but is "{text}".')
-    from ..files import read_rpm, to_si  # loads pint
-
-    try:
-        return read_rpm(text) if unit == "rpm" else to_si(text, unit)
-    except ValueError as error:
-        example = EXAMPLES[unit]
-        raise ValueError(f"must be a number in {unit}, or one with a unit such as {example}, but {error}.") from None
-
-
-def number(must: str = "be finite", holds: Callable[[float], bool] = math.isfinite, unit: str = "") -> Any:
-    """An option that is a number, in `unit` or with a unit of its own, for which `holds` is true."""
-    most = LARGEST.get(unit, math.inf)
-
-    def read(text: str) -> float:
-        value = read_quantity(text, unit)
-        if not (math.isfinite(value) and holds(value) and value <= most):
-            allowed = must if value <= most or math.isnan(value) else f"be at most {most:g} {unit}"
-            raise ValueError(f"must {allowed}, but {value:g} was given.")
-        return value
-
-    return _option({"": "FLOAT", "rpm": "RPM"}.get(unit, unit), read)
-
-
-def count(least: int) -> Any:
-    """An option that is a whole number of at least `least`."""
-    fits = lambda text: text.strip().lstrip("+").isdecimal() and len(text) < 9 and int(text) >= least
-    return text(f"be an integer of at least {least} and at most {MOST}", fits, int, "INT")
-
-
-def pair(sign: str, must: str, holds: Callable[[int, int], bool]) -> Any:
-    """An option of two counts with a sign between them, for which `holds` is true."""
-    split = lambda text: tuple(int(part) for part in text.lower().split(sign))
-    form = re.compile(rf"\d{{1,5}}{sign}\d{{1,5}}", re.IGNORECASE)
-    return text(must, lambda text: form.fullmatch(text) is not None and holds(*split(text)), split)
 
 
 def text(
@@ -93,27 +40,81 @@ def text(
 ) -> Any:
     """An option that is a text for which `holds` is true, as `read` makes of it."""
 
-    def checked(given: str) -> Any:
-        if not holds(given):
-            raise ValueError(f"must {must}, but '{given}' was given.")
-        return read(given)
+    def checked(given: list[str]) -> Any:
+        if not holds(given[0]):
+            raise ValueError(f"must {must}, but '{given[0]}' was given.")
+        return read(given[0])
 
-    return _option(metavar, checked)
+    shown = lambda x: "by the model" if x is None else f"{x:g}" if isinstance(x, float) else str(x)
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar=metavar,
+        instance_from_str=checked,
+        is_instance=lambda _: True,
+        str_from_instance=lambda x: [shown(x)],
+    )
+
+
+def read_quantity(given: str, unit: str) -> float:
+    """The number in a text, in `unit`, which a bare number has already; a speed may say whose it is.
+
+    **Raises:** `ValueError` with the words that follow the option's name.
+    """
+    with contextlib.suppress(ValueError):
+        return float(given)
+    if not unit:
+        raise ValueError(f'must be a number, but is "{given}".')
+    from ..files import read_rpm, to_si  # loads pint
+
+    try:
+        return read_rpm(given) if unit == "rpm" else to_si(given, unit)
+    except ValueError as error:
+        example = EXAMPLES[unit]
+        raise ValueError(f"must be a number in {unit}, or one with a unit such as {example}, but {error}.") from None
+
+
+def number(must: str = "be finite", holds: Callable[[float], bool] = math.isfinite, unit: str = "") -> Any:
+    """An option that is a number, in `unit` or with a unit of its own, for which `holds` is true."""
+    most = LARGEST.get(unit, math.inf)
+
+    def read(given: str) -> float:
+        value = read_quantity(given, unit)
+        if not (math.isfinite(value) and holds(value) and value <= most):
+            allowed = must if value <= most or math.isnan(value) else f"be at most {most:g} {unit}"
+            raise ValueError(f"must {allowed}, but {value:g} was given.")
+        return value
+
+    return text("be a number", lambda given: True, read, {"": "FLOAT", "rpm": "RPM"}.get(unit, unit))
+
+
+def count(least: int) -> Any:
+    """An option that is a whole number of at least `least`."""
+    fits = lambda given: given.strip().lstrip("+").isdecimal() and len(given) < 9 and int(given) >= least
+    return text(f"be an integer of at least {least} and at most {MOST}", fits, int, "INT")
+
+
+def pair(sign: str, must: str, holds: Callable[[int, int], bool]) -> Any:
+    """An option of two counts with a sign between them, for which `holds` is true."""
+    split = lambda given: tuple(int(part) for part in given.lower().split(sign))
+    form = re.compile(rf"\d{{1,5}}{sign}\d{{1,5}}", re.IGNORECASE)
+    return text(must, lambda given: form.fullmatch(given) is not None and holds(*split(given)), split)
 
 
 _SPEED = number("be a speed above 0 rpm", lambda x: x > 0, "rpm")
+_LOAD = number("be above 0 N", lambda x: x > 0, "N")
+_NOT_NEGATIVE = number("be at least 0", lambda x: x >= 0)
+_ABOVE = number("be above 0", lambda x: x > 0)
 _OWN = "Bare numbers are the cage's [rpm], of a bearing with its rollers, or where a file says so, the shaft's"
 _SIDES = f"be ACROSSxUPWARDS, each from {SIDE[0]} to {SIDE[-1]}, e.g. 300x300"
 _CASE = "A published case (1a, 1b, 2a, 2b, 3a, 3b), a bearing with its rollers (nu2310), or a TOML file."
 
-Case = Annotated[tyro.conf.Positional[str], arg(metavar="CASE", help=_CASE)]
+if TYPE_CHECKING:
+    Case = Other = Subject
+else:  # a text that the wrapper reads before it runs the command
+    Case = Annotated[tyro.conf.Positional[Any], text(metavar="CASE"), arg(help=_CASE)]
+    Other = Annotated[tyro.conf.Positional[Any], text(metavar="OTHER"), arg(help="The design to compare it with.")]
 Speed = Annotated[float, _SPEED, arg(help=f'Speed, e.g. "900 rad/s" or "20000 rpm shaft". {_OWN}.')]
-OptionalSpeed = Annotated[float | None, _SPEED, arg(help="The speed, where one is needed.")]
-Load = Annotated[
-    float | None,
-    number("be above 0 N", lambda x: x > 0, "N"),
-    arg(help='Shaft load of a bearing with its rollers [N], e.g. "4.45 kN".'),
-]
+Load = Annotated[float | None, _LOAD, arg(help='Shaft load of a bearing with its rollers [N], e.g. "4.45 kN".')]
 Draws = Annotated[int, count(0), arg(help="Draws from ranges of the file; 0 takes the best guesses.")]
 Seed = Annotated[int, count(0), arg(help="Seed of all that is drawn.")]
 Quick = Annotated[bool, arg(help="Leave out what takes long, such as gradients.")]
@@ -123,7 +124,7 @@ FromTwo = Annotated[int, count(2)]
 OptionalCount = Annotated[int | None, count(1)]
 OptionalZero = Annotated[int | None, count(0)]
 OptionalText = Annotated[str | None, text()]
-Price = Annotated[float | None, number("be at least 0", lambda x: x >= 0)]
+Price = Annotated[float | None, _NOT_NEGATIVE]
 Texts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 Points = Annotated[tuple[int, int] | None, pair("x", _SIDES, lambda a, b: a in SIDE and b in SIDE)]
 Shard = Annotated[tuple[int, int] | None, pair("/", "be I/N with I from 1 to N, e.g. 1/4", lambda i, n: 1 <= i <= n)]
@@ -155,8 +156,7 @@ class StepOptions:
     @property
     def method(self) -> Any:
         """The integration method that is asked for; None leaves the choice to what is computed."""
-        given = {"solver": self.solver, "steps": self.steps, "tolerance": self.tolerance}
-        given = {name: value for name, value in given.items() if value is not None}
+        given = _given(solver=self.solver, steps=self.steps, tolerance=self.tolerance)
         if not given:
             return None
         from ..solve import method, native
@@ -176,9 +176,8 @@ class RunOptions(StepOptions):
     @property
     def settings(self) -> dict[str, Any]:
         """Settings of `jaxcage.lanes.Run` that are given; the model has defaults of its own for the others."""
-        found = {"discard": self.discard, "revolutions": self.revolutions, "method": self.method}
-        found["blocks"] = None if self.revolutions is None else blocks_of(self.revolutions)
-        return {name: value for name, value in found.items() if value is not None}
+        blocks = None if self.revolutions is None else blocks_of(self.revolutions)
+        return _given(discard=self.discard, revolutions=self.revolutions, method=self.method, blocks=blocks)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -194,15 +193,15 @@ class SweepOptions(RunOptions):
 
     @property
     def settings(self) -> dict[str, Any]:
-        found = {"horizon": self.horizon, "exponents": self.exponents, "confirm": False if self.no_confirm else None}
-        return super().settings | {name: value for name, value in found.items() if value is not None}
+        confirm = False if self.no_confirm else None
+        return super().settings | _given(horizon=self.horizon, exponents=self.exponents, confirm=confirm)
 
 
 @dataclasses.dataclass(frozen=True)
 class MeanOptions:
     """Runs at one speed, of a bearing with its rollers."""
 
-    speed: OptionalSpeed = None
+    speed: Annotated[float | None, _SPEED] = None
     """The speed, e.g. "10000 rpm shaft"."""
     load: Load = None
     starts: OptionalCount = None
@@ -214,27 +213,24 @@ class MeanOptions:
 
     def length(self, **usual: int) -> dict[str, int]:
         """Initial states and revolutions as given, or else the usual ones."""
-        return {n: x if getattr(self, n) is None else getattr(self, n) for n, x in usual.items()}
-
-
-_ABOVE = number("be above 0", lambda x: x > 0)
+        return usual | _given(**{name: getattr(self, name) for name in usual})
 
 
 @dataclasses.dataclass(frozen=True)
 class CalmOptions:
-    """What a design of a cage must keep over an operating range."""
+    """Requirements that a design of a cage must keep over an operating range."""
 
     operating: OptionalText = None
     """Range of speed in which the machine runs, e.g. "31500-44000 rpm shaft"."""
     objective: Annotated[str, text("be cost or width", lambda x: x in ("cost", "width"))] = "cost"
-    """What is made small: cost, or the exact width of the unstable ranges within --operating."""
+    """The quantity to minimise: cost, or the exact width of the unstable ranges within --operating."""
     margin: Annotated[float, number("be at least 0 and below 50", lambda x: 0 <= x < 50)] = 10.0
     """Least distance of both ends of the range from the edges of the stable range, per cent of speed."""
     decay: Annotated[float | None, _ABOVE] = None
     """Most revolutions in which a small disturbance falls to 1/e."""
     least_film: OptionalText = None
     """Least distance of cage and land, e.g. "20 um"."""
-    land_force: Annotated[float | None, number("be at least 0", lambda x: x >= 0)] = None
+    land_force: Annotated[float | None, _NOT_NEGATIVE] = None
     """Largest force of the land on the cage in calm motion [N]; 0: they do not touch."""
     grade: Annotated[float | None, _ABOVE] = None
     """Largest balance grade G [mm/s]."""
@@ -257,17 +253,10 @@ class ShowOptions:
     no_cache: bool = False
     """Compile everything anew instead of using programs of earlier runs."""
 
-    @contextlib.contextmanager
-    def computing(self, what: str, advice: str = "") -> Iterator[Say]:
-        """Around a computation: nothing is computed that cannot be written. Yields the function that takes progress.
 
-        `advice` is what is said to a user who interrupts it.
-        """
-        from ..files import check_writable
-
-        check_writable(self.out)
-        with progress(what, advice) as say:
-            yield say
+def _given(**options: Any) -> dict[str, Any]:
+    """Options that are given."""
+    return {name: value for name, value in options.items() if value is not None}
 
 
 def blocks_of(revolutions: int) -> int:

@@ -11,12 +11,13 @@ import jaxcage as jc
 from .._errors import ArgumentError, InputError, NoResult
 from . import options as o
 from .answer import Answer
-from .speed_commands import chances, counted, said_of, swept, zone_tables
-from .subject import RPM, Subject, read_case
+from .progress import report
+from .speed_commands import chances, counted, said_of, swept
+from .subject import RPM, Subject
 
 
 def zones(
-    case: o.Case,
+    subject: o.Case,
     *,
     over: o.Range = o.Range(),
     load: o.Load = None,
@@ -28,41 +29,44 @@ def zones(
 ) -> Answer:
     """Chaotic zones beside the zones without a stable synchronous orbit, with exact edges and their gradients.
 
-    Of a bearing with its rollers stretches of speed with the same motion; of a file with ranges chances of chaos.
+    A bearing with its rollers gives stretches of speed with the same motion, a file with ranges chances of chaos.
     """
-    subject = read_case(case, load)
     if subject.unknowns and draws:
-        return chances(subject, over, draws, seed, run, show)
-    found, answer = swept(subject, over, run, show)
+        return chances(subject, over, draws, seed, run)
+    found, answer = swept(subject, subject.range(over, subject.usual(251, 13)), run)
     if subject.with_rollers:
         return answer
-    model, method, speeds = subject.model, run.method, found["speed"].values
-    with show.computing(f"synchronous orbits of {subject.name}") as say:
-        ends = float(speeds[0]), float(speeds[-1])
-        orbits = jc.orbits.synchronous_orbits(model, *ends, settled=found, method=method, progress=say)
-        loss = jc.loss_zones(orbits)
-        explained = jc.orbits.explain(jc.zones(found), orbits, model, method)
-        slopes = {} if quick else jc.show.edge_slopes(model, loss, explained, method)
+    ends = float(found["speed"][0]), float(found["speed"][-1])
+    orbits = jc.orbits.synchronous_orbits(subject.model, *ends, settled=found, method=run.method, progress=report)
+    return explained(subject, found, orbits, answer, quick, run.method)[0]
+
+
+def explained(
+    subject: Subject, found: Any, orbits: Any, answer: Answer, quick: bool, method: Any
+) -> tuple[Answer, Any, dict[str, Any]]:
+    """The answer about a sweep with the mechanisms of its zones and the zones without a stable synchronous orbit; the
+    chaotic zones; and the sensitivities of exact edges."""
+    name, beside, loss = subject.name, subject.beside, jc.loss_zones(orbits)
+    known = jc.orbits.explain(jc.zones(found), orbits, subject.model, method)
+    slopes = {} if quick else jc.show.edge_slopes(subject.model, loss, known, method)
     tables = [
-        *zone_tables(subject, found, explained.zones),
-        jc.show.loss_table(subject.name, orbits, loss, subject.published, subject.beside),
-        *([jc.show.elasticities_table(subject.name, slopes, subject.beside)] if slopes else []),
+        *jc.show.motion_tables(name, found, known.zones, subject.published, beside),
+        jc.show.loss_table(name, orbits, loss, subject.published, beside),
+        *([jc.show.elasticities_table(name, slopes, beside)] if slopes else []),
     ]
-    notes = [*jc.show.source_notes(explained), *jc.show.unsettled_notes(orbits), *answer.notes]
-    return dataclasses.replace(answer, sentence=said_of(found, explained.zones), tables=tables, notes=notes)
+    notes = [*jc.show.source_notes(known), *jc.show.unsettled_notes(orbits), *answer.notes]
+    said = said_of(found, known.zones)
+    return dataclasses.replace(answer, sentence=said, tables=tables, notes=notes), known.zones, slopes
 
 
-def _searched(
-    subject: Subject, over: o.Range, discard: int | None, method: Any, show: o.ShowOptions, purpose: str = ""
-) -> tuple[Any, Any]:
+def _searched(subject: Subject, over: o.Range, discard: int | None, method: Any, purpose: str = "") -> tuple[Any, Any]:
     """The synchronous orbits over speed, and the zones without a stable one.
 
     **Raises:** `NoResult` if there are none, and for a `purpose` of edges if there are no edges.
     """
-    low, *_, high = subject.range(o.Range(over.first, over.last), 2)
     length: dict[str, Any] = {name: x for name, x in (("count", over.count), ("discard", discard)) if x is not None}
-    with show.computing(f"synchronous orbits of {subject.name}") as say:
-        found = jc.orbits.synchronous_orbits(subject.model, low, high, **length, method=method, progress=say)
+    told = {"method": method, "progress": report}
+    found = jc.orbits.synchronous_orbits(subject.model, *subject.ends(over), **length, **told)
     between, loss = f"between {found.lower_rpm:g} and {found.upper_rpm:g} rpm", jc.loss_zones(found)
     if not found.branches:
         jc.show.require_some(found.sweep, f" {between}")
@@ -75,7 +79,7 @@ def _searched(
 
 
 def bifurcations(
-    case: o.Case,
+    subject: o.Case,
     *,
     over: o.Range = o.Range(),
     discard: o.OptionalZero = None,
@@ -87,18 +91,24 @@ def bifurcations(
     Args:
         discard: Revolutions of the simulations that are left out at the beginning.
     """
-    subject, name = (found := read_case(case)), found.name
     subject.require_orbits("bifurcations")
-    found, loss = _searched(subject, over, discard, steps.method, show)
+    return of_orbits(subject, *_searched(subject, over, discard, steps.method))
+
+
+def of_orbits(subject: Subject, found: Any, loss: Any) -> Answer:
+    """The answer about synchronous orbits over speed, of which there are some."""
+    name, beside = subject.name, subject.beside
     main = found.branches[0 if loss.principal is None else loss.principal.branch]
-    orbits = lambda ax: jc.show.orbit_diagram_with_branches(found.sweep, found.branches, 1, ax)
-    circle = jc.show.drawn(lambda ax: jc.show.multiplier_circle(main, ax), 7.0, 6.0, f"{name}: multipliers")
-    files = {"figure": (".png", jc.show.drawn(orbits, 10.0, 6.0, f"{name}: synchronous orbits"))}
-    files |= {"multipliers": ("_multipliers.png", circle), "data": (".csv", jc.show.branch_columns(found.branches))}
+    orbits = partial(jc.show.orbit_diagram_with_branches, found.sweep, found.branches)
+    files = {
+        "figure": jc.show.drawn(orbits, 10.0, 6.0, f"{name}: synchronous orbits"),
+        "multipliers": jc.show.drawn(partial(jc.show.multiplier_circle, main), 7.0, 6.0, f"{name}: multipliers"),
+        "data": jc.show.branch_columns(found.branches),
+    }
     tables = [
-        jc.show.loss_table(name, found, loss, subject.published, subject.beside),
-        jc.show.stretch_table(name, found, subject.beside),
-        jc.show.edge_table(found, loss, subject.beside),
+        jc.show.loss_table(name, found, loss, subject.published, beside),
+        jc.show.stretch_table(name, found, beside),
+        jc.show.edge_table(found, loss, beside),
     ]
     notes = [
         *jc.show.coexisting_notes(loss),
@@ -108,11 +118,12 @@ def bifurcations(
     ]
     without = ", ".join(map(jc.show.zone_words, loss.zones)) or "none"
     said = f"The synchronous orbit is stable in {len(found.stretches)} ranges of speed; zones without it: {without}."
-    return Answer(said, tables, notes, jc.show.orbits_document(found, loss), subject, files)
+    document = {"points": [jc.show.point_record(p, found) for p in found.points], "missed": found.missed}
+    return Answer(said, tables, notes, document, files)
 
 
 def gradient(
-    case: o.Case,
+    subject: o.Case,
     *,
     over: o.Range = o.Range(),
     lasting: bool = False,
@@ -131,35 +142,30 @@ def gradient(
     wear and power. Those have standard errors.
 
     Args:
-        lasting: Of zones of chaos that lasts, by survival regression (minutes).
+        lasting: Differentiate zones of chaos that lasts, by survival regression (minutes).
         zone: With --lasting: number of the zone, as `jaxcage sweep` counts them; 0 takes all.
         by: With --lasting or --speed: parameters, of which several joined by + change together.
         designs: With --lasting or --speed: designs around this one from which slopes are estimated.
         chaos: With --speed: the mean slope of the largest Lyapunov exponent as well.
     """
-    subject = read_case(case, means.load)
     model, method, name = subject.model, steps.method, subject.name
+    given: dict[str, Any] = {"designs": designs, "seed": seed}
     if subject.with_rollers:
-        given = {"directions": by or jc.design.DIRECTIONS, "designs": designs, "seed": seed}
-        return _of_means(subject, means, steps.tolerance or 1e-4, chaos, given, show)
+        return _of_means(subject, means, steps.tolerance or 1e-4, chaos, by or jc.design.DIRECTIONS, given)
     if means.speed is not None:
         raise InputError(f"Option --speed goes with a bearing with its rollers, but {name} is a cage.")
     if lasting:
-        given = {"names": by or jc.show.FIRST, "designs": designs, "seed": seed, "method": method}
-        return _of_lasting(subject, over, zone, given, show)
+        return _of_lasting(subject, over, zone, by or jc.show.FIRST, given | {"method": method})
     if by or zone:
         raise InputError("Options --by and --zone go with --lasting.")
-    _, loss = _searched(subject, over, means.discard, method, show, "differentiate")
-    with show.computing(f"gradients of {name}"):
-        edges = jc.orbits.sensitivities(model, loss.edges, method=method)
+    _, loss = _searched(subject, over, means.discard, method, "differentiate")
+    edges = jc.orbits.sensitivities(model, loss.edges, method=method)
     trusted = {edge: slope for edge, slope in edges.items() if slope.trusted}
     if not trusted:
         reasons = ", ".join(f"{edge}: {slope.status}" for edge, slope in edges.items())
         raise NoResult(f"No edge is a function of the design here ({reasons}): try more --steps.")
     ends: list[Any] = [trusted.get(f"zone 1 {end}") for end in ("onset", "exit")]
     each = [*([jc.orbits.width(ends[0], ends[1], "zone 1 width")] if all(ends) else []), *trusted.values()]
-    bars = lambda ax: jc.show.elasticity_bars(jc.show.to_be_turned(model, each), ax)
-    figure = jc.show.drawn(bars, 9.0, 2.2 + 1.2 * len(each), f"{name}: elasticities of the edges")
     tables = [
         jc.show.elasticities_table(name, edges, subject.beside),
         jc.show.width_table(f"Widths of the synchronous-loss zones of {name}", edges, jc.show.FIRST),
@@ -168,50 +174,63 @@ def gradient(
     edge, slope = max(trusted.items(), key=lambda item: abs(item[1].elasticity["guidance_gap"]))
     by_gap = f"1 % more guidance gap moves it by {slope.elasticity['guidance_gap']:+.2f} %"
     said = f"{edge.capitalize()}, at {slope.value_rpm:.0f} rpm, answers most to the gap: {by_gap}."
-    return Answer(said, tables, jc.show.missing_notes(edges), {}, subject, {"figure": (".png", figure)})
+    notes = [f"Left out: {n}, {e.kind} ({e.status})." for n, e in edges.items() if not e.trusted]
+    residual = jc.show.residual_words(edges)
+    notes.append(f"Gradients against the scaling of units, largest relative residual: {residual}")
+    return Answer(said, tables, notes, {}, {"figure": bars(subject, each)})
 
 
-def _of_lasting(subject: Subject, over: o.Range, zone: int, given: dict[str, Any], show: o.ShowOptions) -> Answer:
+def bars(subject: Subject, slopes: list[Any]) -> Any:
+    """The figure of the elasticities of edges or widths."""
+    draw = partial(jc.show.elasticity_bars, jc.show.to_be_turned(subject.model, slopes))
+    return jc.show.drawn(draw, 9.0, 2.2 + 1.2 * len(slopes), f"{subject.name}: elasticities of the edges")
+
+
+def _of_lasting(subject: Subject, over: o.Range, zone: int, names: tuple[str, ...], given: dict[str, Any]) -> Answer:
     """Derivatives of edges and widths of zones of lasting chaos, by survival regression."""
     known = [name for name, value in jc.parameters(subject.model).items() if float(value)]
-    if wrong := [name for name in given["names"] if name not in known]:
+    if wrong := [name for name in names if name not in known]:
         raise InputError(f"Option --by must name parameters of {subject.name} that are not 0, but has '{wrong[0]}'.")
     edges, notes, speeds = {}, [], subject.range(over, 251)
-    with show.computing(f"lasting chaos of {subject.name}") as say:
-        found = jc.sweep(subject.model, speeds, method=given["method"], progress=partial(say, "sweep"))
-        jc.show.require_some(found)
-        zones, horizon = jc.zones(found).zones, found.attrs["horizon"]
-        if not zones:
-            raise NoResult(f"No chaos lasts beyond {horizon} revolutions: there is no zone to differentiate.")
-        if zone > len(zones):
-            raise InputError(f"Option --zone must be at most {len(zones)}, the zones of lasting chaos, but is {zone}.")
-        for i, each in [pair for pair in enumerate(zones, start=1) if zone in (0, pair[0])]:
-            try:
-                ends = jc.design.lasting_edges(subject.model, each, **given, progress=partial(say, f"zone {i}"))
-                edges |= {f"zone {i} {end}": edge for end, edge in ends.items()}
-            except ArgumentError as error:
-                notes.append(f"Zone {i} is left out: {error}")
+    found = jc.sweep(subject.model, speeds, method=given["method"], progress=partial(report, "sweep"))
+    jc.show.require_some(found)
+    zones, horizon = jc.zones(found).zones, found.attrs["horizon"]
+    if not zones:
+        raise NoResult(f"No chaos lasts beyond {horizon} revolutions: there is no zone to differentiate.")
+    if zone > len(zones):
+        raise InputError(f"Option --zone must be at most {len(zones)}, the zones of lasting chaos, but is {zone}.")
+    for i, each in [pair for pair in enumerate(zones, start=1) if zone in (0, pair[0])]:
+        told = {"names": names, "progress": partial(report, f"zone {i}")}
+        try:
+            ends = jc.design.lasting_edges(subject.model, each, **told, **given)
+            edges |= {f"zone {i} {end}": edge for end, edge in ends.items()}
+        except ArgumentError as error:
+            notes.append(f"Zone {i} is left out: {error}")
     if not edges:
         raise NoResult(" ".join(notes) or "All zones are open at both ends: there is no edge to differentiate.")
     widths = f"Widths of {subject.name} between mean lives of {horizon} revolutions"
     tables = [
         jc.show.lasting_table(subject.name, edges, horizon, subject.beside),
-        jc.show.width_table(widths, edges, given["names"]),
+        jc.show.width_table(widths, edges, names),
     ]
     said = f"{len(edges)} edges at which the mean life of chaos passes {horizon} revolutions, with standard errors."
-    return Answer(said, tables, notes, {"horizon": horizon}, subject)
+    return Answer(said, tables, notes, {"horizon": horizon})
 
 
 def _of_means(
-    subject: Subject, means: o.MeanOptions, tolerance: float, chaos: bool, given: dict[str, Any], show: o.ShowOptions
+    subject: Subject,
+    means: o.MeanOptions,
+    tolerance: float,
+    chaos: bool,
+    directions: tuple[str, ...],
+    given: dict[str, Any],
 ) -> Answer:
     """Derivatives of the means of runs at one speed, from pairs of designs around the given one."""
     at, length = subject.speed(means.speed), means.length(starts=2, discard=20, revolutions=40)
-    with show.computing(f"gradient {subject.name}") as say:
-        told = {"tolerance": tolerance, "progress": partial(say, "designs")}
-        runs = jc.design.Runs(at, **length, blocks=2, exponents=int(chaos), **told)
-        statistics = (*jc.design.STATISTICS, *(["exponent"] if chaos else []))
-        found = jc.design.mean_gradient(subject.model, runs, statistics, **given)
+    told = {"tolerance": tolerance, "progress": partial(report, "designs")}
+    runs = jc.design.Runs(at, **length, blocks=2, exponents=int(chaos), **told)
+    statistics = (*jc.design.STATISTICS, *(["exponent"] if chaos else []))
+    found = jc.design.mean_gradient(subject.model, runs, statistics, directions=directions, **given)
     title, each = f"{subject.name}, {subject.at(at)}", found.statistics.items()
     by = [(abs(x), n, d, x) for n, g in each for d, x in zip(g.directions, g.elasticity) if np.isfinite(x)]
     _, name, direction, most = max(by, default=(0.0, "nothing", "any parameter", 0.0))
@@ -221,14 +240,13 @@ def _of_means(
         notes.append(f"Not settled, so that more --discard may change it: {', '.join(drifting)}")
     if absent := [n for n, g in each if not np.any(g.value)]:
         notes.append(f"Zero in every run: {', '.join(absent)}")
-    counts = {n: getattr(found, n) for n in ("pairs", "failed", "inaccurate")}
-    document = subject.both(at) | length | counts
-    files = {"figure": (f"_{means.speed:g}rpm.png", jc.show.statistic_bars(found, title))}
-    return Answer(said, jc.show.mean_gradient_tables(title, found), notes, document, subject, files)
+    document = subject.both(at) | length | {n: getattr(found, n) for n in ("pairs", "failed", "inaccurate")}
+    files, tables = {"figure": jc.show.statistic_bars(found, title)}, jc.show.mean_gradient_tables(title, found)
+    return Answer(said, tables, notes, document, files, f"_{means.speed:g}rpm")
 
 
 def map_(
-    case: o.Case,
+    subject: o.Case,
     *,
     y: o.OptionalText = None,
     over: o.Range = o.Range(),
@@ -254,8 +272,7 @@ def map_(
         no_points: Follow the edges of the synchronous orbit only.
         no_curves: Do not follow the edges of the synchronous orbit.
     """
-    subject = read_case(case)
-    model, name, y = subject.model, subject.name, y or subject.usual("guidance_gap", "load")
+    model, y = subject.model, y or subject.usual("guidance_gap", "load")
     if y not in (info := jc.parameter_info(model)):
         raise InputError(f"Option --y must be one of {', '.join(info)}, but '{y}' was given.")
     given: dict[str, Any] = {}
@@ -264,37 +281,52 @@ def map_(
             given |= {} if text is None else {end: jc.files.to_si(text, info[y].unit)}
         except ValueError as error:
             raise ArgumentError(end, said=f"{error}.") from error
-    low, *_, high = subject.range(o.Range(over.first, over.last), 2)
-    axis, found, curves, refused = jc.show.parameter_axis(model, y, **given), None, [], {}
-    title, stem, count = f"{name} over speed and {y}", f"_speed_{y}", points or subject.usual((50, 12), (13, 8))
-    document = {"x": "speed", "y": y, "x_range": (low * RPM, high * RPM), "y_range": (axis.lower, axis.upper)}
-    said, files, tables = [], {}, []
+    axis, curves = jc.show.parameter_axis(model, y, **given), not (no_curves or subject.with_rollers)
+    edges, refused = {}, {}
     if no_points:
         subject.require_orbits("map --no-points")
-    else:
+    if curves:
+        try:
+            discard = 1000 if run.discard is None else run.discard
+            edges = _searched(subject, over, discard, run.method, "follow")[1].edges
+        except NoResult as error:
+            if no_points:
+                raise
+            refused = {"edges": str(error).rstrip(".")}
+    usual = subject.usual({"discard": 1000, "revolutions": 100, "blocks": 20}, {"discard": 20, "revolutions": 20})
+    settings = usual | run.settings | {"starts": starts, "persist": persist}
+    count = None if no_points else points or subject.usual((50, 12), (13, 8))
+    return mapped(subject, subject.ends(over), axis, count, edges, refused, settings)
+
+
+def mapped(
+    subject: Subject,
+    ends: tuple[float, float],
+    axis: Any,
+    count: tuple[int, int] | None,
+    edges: dict[str, Any],
+    refused: dict[str, str],
+    settings: dict[str, Any],
+) -> Answer:
+    """The answer about a map over speeds [rad/s] and a parameter: lanes at points, if any, and edges followed."""
+    low, high = ends
+    found, said, files, tables, y = None, [], {}, [], axis.name
+    title = f"{subject.name} over speed and {y}"
+    document = {"x": "speed", "y": y, "x_range": (low * RPM, high * RPM), "y_range": (axis.lower, axis.upper)}
+    if count is not None:
         grid = {"speed": np.linspace(low, high, count[0])}, {y: np.linspace(axis.lower, axis.upper, count[1])}
-        usual = subject.usual({"discard": 1000, "revolutions": 100, "blocks": 20}, {"discard": 20, "revolutions": 20})
-        with show.computing(f"map {name}") as say:
-            found = jc.label_map(model, *grid, **usual | run.settings, starts=starts, persist=persist, stage=say)
+        found = jc.label_map(subject.model, *grid, **settings, stage=report)
         jc.show.require_some(found)
-        labels, files["data"] = counted(found), (f"{stem}.zarr", found)
+        labels, files["data"] = counted(found), found
         document |= {"points": count, "labels": labels, "exponents": jc.show.top_exponent(found)}
         tables.append(jc.show.shares_table(f"Points of {title}", "label", labels))
         said.append(f"most points are {max(labels, key=labels.__getitem__)}")
-    if not (no_curves or subject.with_rollers):
-        try:
-            _, loss = _searched(subject, over, 1000 if run.discard is None else run.discard, run.method, show, "follow")
-            with show.computing(f"edges of {name}") as say:
-                curves, refused = jc.show.follow_edges(model, loss.edges, (low, high), axis, run.method, say)
-        except NoResult as error:
-            if found is None:
-                raise
-            refused = {"edges": str(error).rstrip(".")}
+    curves, lost = jc.show.follow_edges(subject.model, edges, ends, axis, settings.get("method"), report)
     if curves:
         tables.insert(0, jc.show.curves_table(f"Edges of {title}", curves, axis))
-        files["curve_data"] = f"{stem}.csv", jc.show.curve_columns(curves, axis)
+        files["curve_data"] = jc.show.curve_columns(curves, axis)
         said.insert(0, f"{jc.show.counted(len(curves), 'edge')} followed")
-    files["figure"] = f"{stem}.png", jc.show.map_figure(axis, curves, found, title)
-    notes = [f"Not followed: {edge} ({why})" for edge, why in refused.items()]
+    files["figure"] = jc.show.map_figure(axis, curves, found, title)
+    notes = [f"Not followed: {edge} ({why})" for edge, why in (refused | lost).items()]
     said = f"Over speed and {y}: {', '.join(said) or 'no edge could be followed'}."
-    return Answer(said, tables, notes, document, subject, files)
+    return Answer(said, tables, notes, document, files, f"_speed_{y}")

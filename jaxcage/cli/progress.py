@@ -16,12 +16,24 @@ SECONDS_BETWEEN_LINES = 60.0
 ENDS = (signal.SIGINT, signal.SIGTERM)
 """Signals by which a command is told to end."""
 _SHOW_CURSOR_AND_CLEAR_LINE = "\x1b[?25h\r\x1b[2K"
+
+Report: TypeAlias = Callable[[str, int, int], None]
+"""Takes what is being done, how much of it is done, and of how much."""
 _number: int = signal.SIGINT
 _advice: str | None = None
 """Words for a user who interrupts the computation; None outside of one."""
+_report: Report = lambda stage, done, total: None
 
-Say: TypeAlias = Callable[[str, int, int], None]
-"""Takes what is being done, how much of it is done, and of how much."""
+
+def report(stage: str, done: int, total: int) -> None:
+    """Report progress of the command that runs: what is being done, how much of it is done, and of how much."""
+    _report(stage, done, total)
+
+
+def advise(text: str) -> None:
+    """Say something else than `FILES_ARE_WHOLE` to a user who interrupts this computation."""
+    global _advice
+    _advice = text
 
 
 def say(text: str) -> None:
@@ -34,22 +46,19 @@ def visible(text: str) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
-def shorten_cache_warnings() -> None:
-    """Make one sentence of all that Python and JAX warn of compiled programs that cannot be stored or used."""
-    shown, told = warnings.showwarning, set()
+def shorten_warnings() -> None:
+    """Say each warning in one line, and only once; what JAX says of each compiled program in one sentence for all."""
+    told = set()
 
     def show(message: Warning | str, *where: Any, **more: Any) -> None:
-        text = str(message)
+        text = f"Warning: {message}"
         if "persistent compilation cache" in text:
-            text = "a stored compiled program cannot be used, or not be stored: it is compiled anew."
-        elif not text.startswith("Compiled programs are not kept"):
-            return shown(message, *where, **more)
+            text = "Warning: a stored compiled program cannot be used, or not be stored: it is compiled anew."
         if text not in told:
-            say(f"Warning: {text}")
+            say(text)
         told.add(text)
 
-    if getattr(shown, "__name__", "") != show.__name__:
-        warnings.showwarning = show
+    warnings.showwarning = show
 
 
 def end_at_once_when_interrupted() -> None:
@@ -68,7 +77,6 @@ def interrupted_status() -> int:
 
 
 def _on_interruption(number: int, frame: FrameType | None) -> None:
-    del frame
     global _number
     _number = number
     for each in ENDS:
@@ -83,18 +91,18 @@ def _on_interruption(number: int, frame: FrameType | None) -> None:
 
 
 @contextlib.contextmanager
-def progress(text: str, advice: str = "") -> Iterator[Say]:
+def progress(text: str) -> Iterator[None]:
     """Around a computation: a bar in a terminal, and a line every minute elsewhere."""
-    global _advice
-    _advice = advice or FILES_ARE_WHOLE
+    global _advice, _report
+    advise(FILES_ARE_WHOLE)
     try:
-        with _bar(text) if sys.stderr.isatty() else contextlib.nullcontext(_line_a_minute(text)) as report:
-            yield report
+        with _bar(text) if sys.stderr.isatty() else contextlib.nullcontext(_line_a_minute(text)) as _report:
+            yield
     finally:
-        _advice = None
+        _advice, _report = None, lambda stage, done, total: None
 
 
-def _line_a_minute(text: str) -> Say:
+def _line_a_minute(text: str) -> Report:
     stage, began, first, said = "", time.monotonic(), 0, time.monotonic()
 
     def report(what: str, done: int, total: int) -> None:
@@ -106,18 +114,17 @@ def _line_a_minute(text: str) -> Say:
             return
         said = now
         left = f", {(total - done) * (now - began) / (done - first) / 60:.1f} min left" if done > first else ""
-        say(f"{f'{text}, {what}' if what else text}: {done} of {total}{left}")
+        say(f"{text}, {what}: {done} of {total}{left}")
 
     return report
 
 
 @contextlib.contextmanager
-def _bar(text: str) -> Iterator[Say]:
+def _bar(text: str) -> Iterator[Report]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
     with Progress(*columns, console=Console(stderr=True), transient=True, speed_estimate_period=120) as bar:
         task = bar.add_task(text, total=None)
-        at = lambda what: f"{text}, {what}" if what else text
-        yield lambda what, done, total: bar.update(task, description=at(what), completed=done, total=total)
+        yield lambda what, done, total: bar.update(task, description=f"{text}, {what}", completed=done, total=total)

@@ -15,8 +15,8 @@ import jaxcage as jc
 from .._errors import InputError, NoResult
 from . import options as o
 from .answer import Answer
-from .progress import say
-from .subject import RPM, Subject, read_case
+from .progress import advise, report, say
+from .subject import RPM, Subject
 from .values import read_vary
 
 
@@ -30,17 +30,13 @@ COMPARED = (
 ).split()
 """Variables that are compared, of those that a data set has."""
 RAMPED = ("size", "eccentricity", "cage_slip", "friction_power_W")
-"""Variables of a ramp that are shown, of those that a data set has."""
-ROWS = 20
-"""Windows of a ramp that are shown, about."""
+"""Variables of a ramp in its figure, of those that a data set has."""
 MOST_POINTS = 30_000_000
 """Points of a study, each from several initial states: a week at a rate of 150 lanes a second."""
-ADVICE = "what is stored stays, and the same command goes on from there"
-AGAIN = "the same command without --shard computes again what is damaged and leaves the rest"
 
 
 def simulate(
-    case: o.Case,
+    subject: o.Case,
     *,
     speed: o.Speed,
     load: o.Load = None,
@@ -48,14 +44,12 @@ def simulate(
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
     """Time history and forces at one speed, of 20 revolutions if left out; slips of a bearing with its rollers."""
-    subject = read_case(case, load)
     model, at, method = subject.model, subject.speed(speed), run.method
-    where, stem = subject.at(at), f"_{speed:g}rpm"
     steps = getattr(method, "steps", 128)  # of equal steps the samples must divide the number
     length: dict[str, Any] = {"revolutions": run.revolutions or 20, "discard": run.discard or 0}
     samples = max(n for n in range(1, min(128, steps) + 1) if steps % n == 0)
-    with show.computing(f"simulate {subject.name}"):
-        found = jc.simulate(model, at, **length, samples=samples, method=method)
+    found = jc.simulate(model, at, **length, samples=samples, method=method)
+    where = subject.at(at)
     if found.outcome not in ("successful", "inaccurate"):
         raise NoResult(f"The simulation at {where} failed ({found.outcome}): try more --steps, or another --solver.")
     title, measures = f"{subject.name}, {where}", jc.measures(model, found)
@@ -67,15 +61,15 @@ def simulate(
         shares = jc.analysis.pocket_force_distribution(rollers.history)
         document |= {"around": rollers.around, "orders": rollers.orders, "force_shares": shares}
         columns = jc.show.roller_columns(rollers.history)
-    tables, figure = jc.show.run_tables(title, measures, rollers), jc.show.run_figure(model, found, rollers, title)
     said = ", ".join(f"{n.replace('_', ' ')} {measures[n].value:.4g}" for n in TOLD if n in measures)
     note = f"Error of a revolution: at most {found.error:.0e} of the scale ({found.outcome})"
-    files = {"figure": (f"{stem}.png", figure), "data": (f"{stem}.csv", columns)}
-    return Answer(f"At {where}: {said}.", tables, [note], document, subject, files)
+    files = {"figure": jc.show.run_figure(model, found, rollers, title), "data": columns}
+    tables = jc.show.run_tables(title, measures, rollers)
+    return Answer(f"At {where}: {said}.", tables, [note], document, files, f"_{speed:g}rpm")
 
 
 def sweep(
-    case: o.Case,
+    subject: o.Case,
     *,
     over: o.Range = o.Range(),
     load: o.Load = None,
@@ -86,36 +80,34 @@ def sweep(
 ) -> Answer:
     """Sweep over speed from several initial states: labels, exponents, chaotic zones; slips and losses of a bearing.
 
-    Of a file with ranges chances of chaos.
+    A file with ranges gives chances of chaos.
     """
-    subject = read_case(case, load)
-    if subject.unknowns and draws:
-        return chances(subject, over, draws, seed, run, show)
-    return swept(subject, over, run, show)[1]
+    return (
+        chances(subject, over, draws, seed, run)
+        if subject.unknowns and draws
+        else swept(subject, subject.range(over, subject.usual(251, 13)), run)[1]
+    )
 
 
-def swept(subject: Subject, over: o.Range, run: o.SweepOptions, show: o.ShowOptions) -> tuple[Any, Answer]:
-    """The data set of a sweep, and the answer about it."""
-    speeds = subject.range(over, subject.usual(251, 13))
-    with show.computing(f"sweep of {subject.name}") as progress:
-        found = jc.sweep(subject.model, speeds, **run.settings, progress=partial(progress, ""))
+def swept(subject: Subject, speeds: Any, run: o.RunOptions) -> tuple[Any, Answer]:
+    """The data set of a sweep over speeds [rad/s], and the answer about it."""
+    found = jc.sweep(subject.model, speeds, **run.settings, progress=partial(report, "sweep"))
     jc.show.require_some(found)
-    zones, counts, title = zones_of(found), counted(found), f"{subject.name}, {jc.analysis.length(found)}"
+    zones, title = zones_of(found), f"{subject.name}, {jc.analysis.length(found)}"
     if short := int(np.sum(jc.analysis.too_short(found))):
         cure = jc.analysis.cure(found) or ": choose more --revolutions"
         say(f"Warning: {jc.show.counted(short, 'lane')} without a certain label{cure}.")
     if beyond := int(np.sum(found["peak"].values > 1)) * (not subject.with_rollers):
         say(f"Warning: {jc.show.counted(beyond, 'lane')} went beyond eps = 1, where the surfaces would overlap.")
-    tables = zone_tables(subject, found, zones)
+    tables = jc.show.motion_tables(subject.name, found, zones, subject.published, subject.beside)
     if names := [n for n in SHOWN if n in found]:
         tables.append(jc.show.quantities_table(f"Means over initial states, {title}", found, [*names, "exponent"]))
     document = {name: found.attrs[name] for name in ("discard", "revolutions", "horizon")}
-    document |= {"speeds": speeds.size, "starts": found.sizes["start"], "labels": counts, "too_short": short}
+    document |= {"speeds": speeds.size, "starts": found.sizes["start"], "labels": counted(found), "too_short": short}
     document |= {"failed": jc.analysis.outcomes(found), "confirmed": json.loads(found.attrs["confirmed"])}
     document["error"] = float(np.nanmax(found["error"].values))
-    figure = jc.show.sweep_figure(found, zones, subject.published, title)
-    files = {"figure": (".png", figure), "data": (".zarr", found)}
-    return found, Answer(said_of(found, zones), tables, [jc.summary(found)], document, subject, files)
+    files = {"figure": jc.show.sweep_figure(found, zones, subject.published, title), "data": found}
+    return found, Answer(said_of(found, zones), tables, [jc.summary(found)], document, files)
 
 
 def counted(found: Any) -> dict[str, int]:
@@ -128,19 +120,9 @@ def zones_of(found: Any) -> Any:
     return jc.zones(found) if "strobe" in found else jc.stretches(found)
 
 
-def zone_tables(subject: Subject, found: Any, zones: Any) -> list[Any]:
-    """Tables of zones of chaos, or of stretches of speed."""
-    if "strobe" not in found:
-        return [jc.show.stretches_table(subject.name, zones)]
-    span = float(found["rpm"][0]), float(found["rpm"][-1])
-    table = jc.show.zones_table(subject.name, zones, subject.published, span, subject.beside)
-    details = jc.show.zone_details(f"Chaotic zones of {subject.name} in detail", zones.zones)
-    return [table, *details, *jc.show.transient_tables(subject.name, zones)]
-
-
 def said_of(found: Any, zones: Any) -> str:
     """The zones in a sentence."""
-    rpm, words = found["rpm"].values, jc.show.zone_words
+    rpm = found["rpm"].values
     between = f"between {rpm[0]:.0f} and {rpm[-1]:.0f} rpm" if rpm.size > 1 else f"at {rpm[0]:.0f} rpm"
     if "strobe" not in found:
         chaotic = sum(zone.speeds for zone in zones if zone.chaotic)
@@ -150,113 +132,90 @@ def said_of(found: Any, zones: Any) -> str:
         return f"{said}; motion: {', '.join(each)}."
     lasts = f" that lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
     dies = f"; {len(zones.transient)} of chaos that dies out" if zones.transient else ""
-    count, each = len(zones.zones), ", ".join(map(words, zones.zones))
+    count, each = len(zones.zones), ", ".join(map(jc.show.zone_words, zones.zones))
     return f"{count or 'No'} zone{'s' * (count != 1)} of chaos{lasts} {between}{each and ': '}{each}{dies}."
 
 
-def chances(subject: Subject, over: o.Range, draws: int, seed: int, run: o.RunOptions, show: o.ShowOptions) -> Answer:
-    """Chances of chaos by speed, of a file with ranges."""
-    with show.computing(f"draws of {subject.name}") as progress:
-        found = draw(subject, subject.range(over, 40), draws, seed, run, progress)
-    if found.failed.all():
-        raise NoResult(f"All {found.failed.size} simulations failed: try more steps (--steps), or narrower ranges.")
-    title, chance = f"{subject.name}: {draws} draws", (found.rpm, found.chance, found.interval)
-    columns = {f"{key.replace('_rpm', '').replace('_', ' ')} [rpm]": x for key, x in subject.both(found.speed).items()}
-    columns |= dict(zip(("chance of chaos", "lower", "upper"), (found.chance, *found.interval), strict=True))
-    figure = jc.show.drawn(lambda ax: jc.show.chance_of_chaos(*chance, ax), title=title)
-    tables, notes = jc.show.chances_tables(subject.name, found, subject.beside), jc.show.chances_notes(found)
-    document, files = jc.show.chances_document(found), {"figure": (".png", figure), "data": (".csv", columns)}
-    return Answer(jc.show.chances_answer(found), tables, notes, document, subject.certain, files)
-
-
-def draw(subject: Subject, speeds: Any, draws: int, seed: int, run: o.RunOptions, progress: Any) -> Any:
-    """The motions of draws from the ranges of a file over speed, of at most 100 revolutions after 100."""
+def chances(subject: Subject, over: o.Range, draws: int, seed: int, run: o.RunOptions) -> Answer:
+    """Chances of chaos by speed, of a file with ranges: motions of draws, of at most 100 revolutions after 100."""
     most = jc.design.REVOLUTIONS
     length: dict[str, Any] = {name: min(getattr(run, name) or most, most) for name in ("discard", "revolutions")}
     length |= {"blocks": o.blocks_of(length["revolutions"]), "draws": draws, "seed": seed, "method": run.method}
-    given = subject.model, subject.unknowns, speeds
-    return jc.design.ensemble(*given, **length, progress=partial(progress, "draws"))
+    given = subject.model, subject.unknowns, subject.range(over, 40)
+    found = jc.design.ensemble(*given, **length, progress=partial(report, "draws"))
+    if found.failed.all():
+        raise NoResult(f"All {found.failed.size} simulations failed: try more steps (--steps), or narrower ranges.")
+    columns = subject.speed_columns(found.speed)
+    columns |= dict(zip(("chance of chaos", "lower", "upper"), (found.chance, *found.interval), strict=True))
+    figure = jc.show.drawn(partial(jc.show.chance_of_chaos, found), title=f"{subject.name}: {draws} draws")
+    tables, notes = jc.show.chances_tables(subject.name, found, subject.beside), jc.show.chances_notes(found)
+    document, files = jc.show.chances_document(found), {"figure": figure, "data": columns}
+    return Answer(jc.show.chances_answer(found), tables, notes, document, files, by_ranges=True)
 
 
 def poincare(
-    case: o.Case,
+    subject: o.Case,
     *,
     speed: o.Speed,
     run: o.RunOptions = o.RunOptions(revolutions=1000),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
     """Strobe section at one speed, from all initial states."""
-    subject = read_case(case)
     subject.require_orbits("poincare")
-    settings: dict[str, Any] = run.settings | {"keep": run.revolutions}
-    at, stem = subject.speed(speed), f"_{speed:g}rpm"
-    where = f"{subject.name}, {subject.at(at)}"
-    with show.computing(f"poincare {subject.name}") as progress:
-        found = jc.sweep(subject.model, np.array([at]), **settings, progress=partial(progress, ""))
+    at = subject.speed(speed)
+    settings: dict[str, Any] = run.settings | {"keep": run.revolutions, "progress": partial(report, "sweep")}
+    found = jc.sweep(subject.model, np.array([at]), **settings)
     jc.show.require_some(found, f" at {subject.at(at)}")
     starts = []
     for i, lane in enumerate(found.isel(speed=0).transpose("start", ...)["strobe"]):
         row = {name: str(found[name].values[0, i]) for name in ("label", "outcome")} | {"start": i + 1}
-        row |= {name: float(found[f"{name}"].values[0, i, 0]) for name in ("exponents", "standard_error")}
+        row |= {name: float(found[name].values[0, i, 0]) for name in ("exponents", "standard_error")}
         starts.append(row | {name: lane.sel(component=name).values for name in ("y_C", "vy_C")})
-    exponent = jc.show.Column("largest exponent per revolution", (), key="exponents", errors="standard_error")
-    columns = [jc.show.Column("start", ()), jc.show.Column("label", ()), exponent]
-    names = [f"start {row['start']}: {row['label']}" for row in starts]
-    draw = lambda ax: jc.show.strobe_section(found["strobe"].values[0], ax, names=names)
-    figure = jc.show.drawn(draw, 6.5, 5.4, where)
-    files = {"figure": (f"{stem}.png", figure), "data": (f"{stem}.csv", jc.show.strobe_columns(found))}
-    table = jc.show.rows_table(f"Strobe section of {where}, {jc.analysis.length(found)}", starts, columns, "starts")
-    said = f"At {subject.at(at)} the motion is {' or '.join(counted(found))}."
-    return Answer(said, [table], [], subject.both(at), subject, files)
+    exponent = jc.show.Column("largest exponent per revolution", "exponents", error="standard_error")
+    title, names = f"{subject.name}, {subject.at(at)}", [f"start {row['start']}: {row['label']}" for row in starts]
+    figure = jc.show.drawn(lambda ax: jc.show.strobe_section(found["strobe"].values[0], ax, names), 6.5, 5.4, title)
+    title = f"Strobe section of {title}, {jc.analysis.length(found)}"
+    tables = [jc.show.table(title, starts, ["start", "label", exponent], "starts")]
+    files, said = {"figure": figure, "data": jc.show.strobe_columns(found)}, " or ".join(counted(found))
+    return Answer(f"At {subject.at(at)} the motion is {said}.", tables, [], subject.both(at), files, f"_{speed:g}rpm")
 
 
 def compare(
-    case: o.Case,
-    other: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="OTHER")],
+    subject: o.Case,
+    other: o.Other,
     *,
     over: o.Range = o.Range(),
     run: o.SweepOptions = o.SweepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Two designs side by side at the same speeds of the shaft: differences, labels, zones, forces, wear.
-
-    Args:
-        other: The design to compare it with, a case or a TOML file.
-    """
-    one, two = read_case(case), read_case(other)
-    if one.with_rollers != two.with_rollers:
-        kind = one.usual("a cage", "a bearing with its rollers")
-        raise InputError(f"Case '{other}' must be {kind}, as the first one is: two of a kind are compared.")
-    pair = [one, dataclasses.replace(two, name=f"{two.name}_second") if two.name == one.name else two]
-    names, times = [each.name for each in pair], 1.0 if one.shaft is None else one.shaft / (two.shaft or 1.0)
-    speeds = one.range(over, one.usual(126, 13))
-    two.speed(speeds[-1] * times * RPM, "last", two.own)
-    found, rows, said, tables, designs = [], [], [], [], {}
-    with show.computing(f"compare {names[0]}") as progress:
-        for each, factor in zip(pair, (1.0, times), strict=True):
-            swept = jc.sweep(each.model, speeds * factor, **run.settings, progress=partial(progress, each.name))
-            jc.show.require_some(swept, f" of {each.name}")
-            found.append(_measured(each, swept))
-    quantities = [n for n in COMPARED if n == "exponent" or n in found[0]]
-    for each, data in zip(pair, found, strict=True):
-        means = {n: jc.show.mean_over_starts(data, n) for n in quantities}
+    """Two designs side by side at the same speeds of the shaft: differences, labels, zones, forces, wear."""
+    if subject.with_rollers != other.with_rollers:
+        kind = subject.usual("a cage", "a bearing with its rollers")
+        raise InputError(f"Case '{other.name}' must be {kind}, as the first one is: two of a kind are compared.")
+    second = dataclasses.replace(other, name=f"{other.name}_second") if other.name == subject.name else other
+    pair, times = (subject, second), 1.0 if subject.shaft is None else subject.shaft / (second.shaft or 1.0)
+    names, speeds = [each.name for each in pair], subject.range(over, subject.usual(126, 13))
+    second.rpm(speeds[-1] * times * RPM, "last", second.own)
+    found, means, said, tables, designs = [], [], [], [], {}
+    for each, factor in zip(pair, (1.0, times), strict=True):
+        data = jc.sweep(each.model, speeds * factor, **run.settings, progress=partial(report, each.name))
+        jc.show.require_some(data, f" of {each.name}")
+        found.append(data := _measured(each, data))
+        own = {n: jc.show.mean_over_starts(data, n) for n in COMPARED if n == "exponent" or n in data}
         designs[each.name] = {"labels": data["label"].values, **each.both(data["speed"].values)}
-        for name, (mean, error) in means.items():
-            designs[each.name] |= {name: mean, f"{name}_error": error}
-        rows.append({"design": each.name, **{n: float(np.nanmean(mean)) for n, (mean, _) in means.items()}})
+        designs[each.name] |= {n: mean for n, (mean, _) in own.items()}
+        designs[each.name] |= {f"{n}_error": error for n, (_, error) in own.items()}
+        means.append({n: float(np.nanmean(mean)) for n, (mean, _) in own.items()})
         said.append(f"{each.name}: {said_of(data, zones_of(data))}")
-        tables += [dataclasses.replace(table, key="") for table in zone_tables(each, data, zones_of(data))]
-    transposed = [{"measure": n.replace("_", " "), **{row["design"]: row[n] for row in rows}} for n in quantities]
-    columns = [jc.show.Column(n, ()) for n in ("measure", *names)]
+        tables += jc.show.motion_tables(each.name, data, zones_of(data), each.published, each.beside)
+    rows = [{"measure": n.replace("_", " "), **{x: m[n] for x, m in zip(names, means, strict=True)}} for n in means[0]]
     tables = [
-        jc.show.rows_table("Means over speed, in SI units", transposed, columns, "means"),
+        jc.show.table("Means over speed, in SI units", rows, ["measure", *names], "means"),
         jc.show.differences_table(names, [each.model for each in pair]),
-        *tables,
+        *(dataclasses.replace(table, key="") for table in tables),
     ]
-    figure = jc.show.sweeps_beside(names, found, [zones_of(data) for data in found])
-    files = {"figure": (f"_{names[1]}.png", figure)}
-    files["measures"] = f"_{names[1]}_measures.png", jc.show.quantities_beside(names, found, quantities[1:])
-    return Answer(" ".join(said), tables, [], {"cases": names, "designs": designs}, one, files)
+    files = {"figure": jc.show.quantities_beside(names, found, list(means[0]), title=" and ".join(names))}
+    return Answer(" ".join(said), tables, [], {"cases": names, "designs": designs}, files, f"_{names[1]}")
 
 
 def _measured(subject: Subject, found: Any) -> Any:
@@ -265,13 +224,12 @@ def _measured(subject: Subject, found: Any) -> Any:
         return found
     loads, dims = jc.design.land_loads(subject.model, found), ("speed", "start")
     about = {"orbit_size": (jc.design.motions(subject.model, found)[0], "m")}
-    about |= {f"{n.replace(' ', '_')}": (loads[n], u) for n, u in (("peak land force", "N"), ("wear load", "N m/s"))}
-    words = lambda name, unit: {"units": unit, "long_name": name.replace("_", " ")}
-    return found.assign({name: (dims[: x.ndim], x, words(name, unit)) for name, (x, unit) in about.items()})
+    about |= {"peak_land_force": (loads["peak land force"], "N"), "wear_load": (loads["wear load"], "N m/s")}
+    return found.assign({name: (dims[: x.ndim], x, {"units": unit}) for name, (x, unit) in about.items()})
 
 
 def runup(
-    case: o.Case,
+    subject: o.Case,
     *,
     over: o.Range = o.Range(),
     rate: Annotated[float, o.number("be a rate above 0 rpm/s", lambda x: x > 0)] = 5000.0,
@@ -288,38 +246,30 @@ def runup(
         windows: Parts into which each ramp is cut at least; each has an even number of revolutions.
         discard: Revolutions at the first speed before the ramp begins.
     """
-    subject = read_case(case, load)
-    low, *_, high = subject.range(over, 2)
     settle = subject.usual(100, 10) if discard is None else discard
     given = {"windows": windows or subject.usual(100, 24), "settle": settle, "method": steps.method}
-    with show.computing(f"runup {subject.name}"):
-        found = jc.lanes.ramp_up_down(subject.model, low, high, subject.rate(rate), **given)
-    differs, spans = jc.lanes.apart(found), jc.lanes.stretches_apart(found)
-    ways, rows = {way: found.sel(way=way) for way in ("up", "down")}, slice(None, None, -(-differs.size // ROWS))
-    names, rpm = [n for n in RAMPED if n in found], ways["up"]["rpm"].values
-    columns = [jc.show.Column("speed [rpm]", rpm[rows].tolist(), digits=0)]
-    data = {f"{key.removesuffix('_rpm').replace('_', ' ')} [rpm]": x for key, x in subject.both(rpm / RPM).items()}
-    for name in found.data_vars:
-        unit = found[name].attrs["units"]
-        data |= {f"{name} {way} [{unit}]": x[name].values for way, x in ways.items()}
-        for way, x in ways.items() if name in names else ():
-            columns.append(
-                jc.show.Column(f"{jc.show.head_of(str(name), unit)} {way}", x[name].values[rows].tolist(), unit)
-            )
-    columns.append(jc.show.Column("hysteresis", ["differs" if x else "" for x in differs[rows]]))
+    found = jc.lanes.ramp_up_down(subject.model, *subject.ends(over), subject.rate(rate), **given)
+    spans, ways = jc.lanes.stretches_apart(found), {way: found.sel(way=way) for way in ("up", "down")}
+    data = subject.speed_columns(ways["up"]["rpm"].values / RPM)
+    for name, x in found.data_vars.items():
+        data |= {f"{name} {way} [{x.attrs['units']}]": x.sel(way=way).values for way in ways}
+    rows = [{"from": low, "to": high} for low, high in spans]
+    columns = [jc.show.Column(f"{end} [rpm]", end, digits=0) for end in ("from", "to")]
+    title = f"Run-up and run-down of {subject.name}, {rate:g} rpm/s, {found.attrs['revolutions']} revolutions each"
     each = ", ".join(f"{a:.0f} to {b:.0f} rpm" for a, b in spans)
     said = f"Up and down differ: {each}. A slower ramp tells whether the cage only lags behind."
     said = said if spans else "Up and down are alike within their scatter: no hysteresis is seen at this rate."
-    title = f"Run-up and run-down of {subject.name}, {rate:g} rpm/s, {found.attrs['revolutions']} revolutions each"
-    document = {"rate_rpm_per_s": rate, "hysteresis_rpm": spans, "ramp_seconds": found.attrs["seconds"]}
+    document = {"rate_rpm_per_s": rate, "ramp_seconds": found.attrs["seconds"]}
     document |= {way: {n: x[n].values for n in ("rpm", *x.data_vars)} for way, x in ways.items()}
+    names = [n for n in RAMPED if n in found]
     figure = jc.show.quantities_beside(("run-up", "run-down"), [*ways.values()], names, spans, title)
-    files = {"figure": (".png", figure), "data": (".csv", data | {"differs": differs})}
-    return Answer(said, [jc.show.Table(title, columns)], [], document, subject, files)
+    files = {"figure": figure, "data": data | {"differs": jc.lanes.apart(found)}}
+    tables = [jc.show.table(f"{title}: where they differ", rows, columns, "hysteresis")]
+    return Answer(said, tables, [], document, files)
 
 
 def study(
-    case: o.Case,
+    subject: o.Case,
     *,
     vary: Annotated[o.Texts, tyro.conf.arg(metavar="NAME=VALUES")] = (),
     sample: o.FromZero = 0,
@@ -342,31 +292,31 @@ def study(
         chunk: Lanes computed and stored together.
         shard: Part of the work, e.g. 2/4: every fourth chunk from the second on. All parts write to the same store.
     """
-    subject = read_case(case)
     path = Path(show.out) / f"study_{subject.name}.zarr"
     given, done = read_vary(vary, subject), []
     if np.prod([max(sample, 1.0), *(float(x.size) for x in given.values() if isinstance(x, np.ndarray))]) > MOST_POINTS:
         raise InputError(f"Options --vary and --sample must make at most {MOST_POINTS} points to run lanes at.")
     settings: dict[str, Any] = {"samples": sample, "seed": seed, "starts": starts, "lanes": chunk}
     settings |= {"shard": shard or (1, 1)} | run.settings | ({} if exponents is None else {"exponents": exponents})
-    with show.computing(f"study {subject.name}", ADVICE) as bar:
+    advise("what is stored stays, and the same command goes on from there")
 
-        def report(so_far: int, total: int) -> None:
-            done.append(so_far)
-            bar("lanes", so_far, total)
+    def stored_so_far(lanes: int, total: int) -> None:
+        done.append(lanes)
+        report("lanes", lanes, total)
 
-        try:
-            with jc.study(subject.model, given, store=path, progress=report, **settings) as stored:
-                names = [str(name) for name, x in stored.data_vars.items() if x.dims == stored["label"].dims]
-                found = stored[names].load()
-        except ValueError as error:  # a chunk that another shard has written
-            if isinstance(error, InputError):
-                raise
-            raise NoResult(f"The store '{path}' is damaged: {AGAIN}.") from error
+    try:
+        with jc.study(subject.model, given, store=path, progress=stored_so_far, **settings) as stored:
+            names = [str(name) for name, x in stored.data_vars.items() if x.dims == stored["label"].dims]
+            found = stored[names].load()
+    except ValueError as error:  # a chunk that another shard has written
+        if isinstance(error, InputError):
+            raise
+        again = "the same command without --shard computes again what is damaged and leaves the rest"
+        raise NoResult(f"The store '{path}' is damaged: {again}.") from error
     dims, counts, size = found["label"].dims, counted(found), found["label"].size
-    left, lanes = counts.pop("pending", 0), found.stack(lane=dims)
-    if left:
+    if left := counts.pop("pending", 0):
         say(f"Warning: {jc.show.counted(left, 'lane')} left for the other shards.")
+    lanes = found.stack(lane=dims)
     jc.show.require_some(lanes.isel(lane=np.flatnonzero(lanes["label"].values != "pending")))
     document = {"axes": dict(zip(dims, found["label"].shape, strict=True)), "lanes": size, "labels": counts}
     document |= {"stored": size - left, "stored_before": size - left - done[-1] + done[0]}
@@ -374,6 +324,5 @@ def study(
     document["least_median_most"] = {name: np.nanpercentile(x, (0, 50, 100)) for name, x in means.items()}
     shape = " x ".join(f"{n} {axis}" for axis, n in document["axes"].items())
     said = f"{size - left} of {size} lanes are stored; {max(counts, key=counts.__getitem__)} is most common."
-    notes = [f"Open it: jaxcage.open_study({str(path)!r})"]
-    tables = [jc.show.shares_table(f"Lanes: {shape}", "label", counts)]
-    return Answer(said, tables, notes, document, subject, stored={"store": str(path)})
+    tables, opened = [jc.show.shares_table(f"Lanes: {shape}", "label", counts)], f"jaxcage.open_study({str(path)!r})"
+    return Answer(said, tables, [f"Open it: {opened}"], document, {"store": path})

@@ -31,9 +31,11 @@ class Subject:
     model: Any
     published: "PublishedCase | None" = None
     file: "BearingFile | None" = None
+    path: str = ""
+    """Path of the file as it was given."""
 
     @property
-    def own(self) -> str:
+    def own(self) -> Any:
         """Whose speed the model's is: `cage` or `shaft`."""
         return self.model.speed_text.split()[0]
 
@@ -76,6 +78,10 @@ class Subject:
         cage, shaft = (own, self._other(own)) if self.own == "cage" else (self._other(own), own)
         return {"speed_rpm": own, "cage_speed_rpm": cage, "shaft_speed_rpm": shaft}
 
+    def speed_columns(self, speed: Any) -> dict[str, Any]:
+        """The same as columns of a file."""
+        return {f"{key.removesuffix('_rpm').replace('_', ' ')} [rpm]": x for key, x in self.both(speed).items()}
+
     def at(self, speed: float) -> str:
         """A speed of the model [rad/s] in words."""
         other = "shaft" if self.own == "cage" else "cage"
@@ -86,18 +92,18 @@ class Subject:
         slope = 1.0 if self.speeds == self.own else float(self._other(1.0) - self._other(0.0))
         return given / slope / RPM
 
-    def speed(self, given: float | None, option: str = "speed", whose: Any = None) -> float:
-        """The speed of the model [rad/s] that an option means; `whose` owns bare numbers in place of the usual."""
-        return jc.rpm(self._rpm(given, option, whose or self.speeds))
+    def speed(self, given: float | None) -> float:
+        """The speed of the model [rad/s] that `--speed` means."""
+        return jc.rpm(self.rpm(given, "speed"))
 
-    def _rpm(self, given: float | None, option: str, whose: Any) -> float:
-        """The speed of the model [rpm] that an option means.
+    def rpm(self, given: float | None, option: str, whose: Any = None) -> float:
+        """The speed of the model [rpm] that an option means; `whose` owns bare numbers in place of the usual.
 
         **Raises:** `InputError` for no speed, and for one at which no cage runs.
         """
         if given is None:
             raise InputError(f'Option {flag(option)} must be given, e.g. {flag(option)} "10000 rpm shaft".')
-        speed = jc.files.own_rpm(self.model, given, whose)
+        speed = jc.files.own_rpm(self.model, given, whose or self.speeds)
         if self.own == "shaft" and speed <= 0:
             at_rest = float(self._other(0.0))
             raise InputError(
@@ -119,59 +125,55 @@ class Subject:
 
         **Raises:** `InputError` for a range that does not ascend.
         """
-        low, high = (
-            self._rpm(end, option, self.speeds) for option, end in (("first", over.first), ("last", over.last))
-        )
-        if (count := over.count or count) > 1 and high <= low:
+        low, high, count = self.rpm(over.first, "first"), self.rpm(over.last, "last"), over.count or count
+        if count > 1 and high <= low:
             between = f"{low:g} to {high:g} rpm of the {self.own}"
             raise InputError(f"Option --last must be above --first, but the range is {between}.")
         return jc.rpm(low, high, count)
+
+    def ends(self, over: Range) -> tuple[float, float]:
+        """Lowest and highest speed of the model [rad/s] of a range."""
+        low, high = self.range(dataclasses.replace(over, count=None), 2)
+        return float(low), float(high)
+
+    def under(self, load: float | None) -> "Subject":
+        """The bearing under a load [N]; itself without one.
+
+        **Raises:** `InputError` for a cage, whose forces do not follow from the load.
+        """
+        if load is not None and not self.with_rollers:
+            raise InputError(f"Option --load goes with a bearing with its rollers, but {self.name} is a cage.")
+        return self if load is None else dataclasses.replace(self, model=jc.replace(self.model, load=load))
 
     def require_orbits(self, command: str) -> None:
         """**Raises:** `InputError` for a model whose revolutions do not repeat."""
         if self.with_rollers:
             raise InputError(f"Command {command} takes a cage, but {self.name} is a bearing with its rollers.")
 
-    def require_ranges(self) -> None:
-        """**Raises:** `InputError` for a model that is known exactly."""
-        if not self.unknowns:
-            example = 'such as stiffness = "1e4 .. 1e6 N/m"'
-            raise InputError(f"Case {self.name} must be a TOML file with ranges, {example}, but has none.")
+    def about(self, by_ranges: bool) -> tuple[dict[str, Any], list[str]]:
+        """Entries of the case in every document, and sentences about it; best guesses only where these were taken."""
+        from .._parameters import readings_of  # loads JAX
 
-    @property
-    def certain(self) -> "Subject":
-        """This case without its ranges, for answers that have taken them into account."""
-        return dataclasses.replace(self, file=self.file and dataclasses.replace(self.file, unknowns=()))
-
-    @property
-    def document(self) -> dict[str, Any]:
-        """Entries of the case in every document."""
-        readings = jc._parameters.readings_of(self.model).items()
-        found: dict[str, Any] = {"readings": {name: chosen for name, (chosen, _) in readings}}
-        found |= {} if self.shaft is None else {"cage_speed_ratio": 1 / self.shaft}
-        found |= {"load_N": float(self.model.load)} if self.with_rollers else {}
-        if self.file is not None:
-            found |= {"left_as_in_template": self.file.left, "best_guesses": [u.label for u in self.unknowns]}
-        return found
-
-    @property
-    def notes(self) -> list[str]:
-        """Sentences about the readings, the template's values and the best guesses of the case."""
-        said, readings = self.document, jc.show.readings_words(self.model)
-        each = {
-            "Readings": [readings] if readings else [],
-            "As the template has them, of another bearing": said.get("left_as_in_template"),
-            "Best guesses of values known within ranges only": said.get("best_guesses"),
+        left = () if self.file is None else self.file.left
+        guesses = [] if by_ranges else [u.label for u in self.unknowns]
+        document: dict[str, Any] = {"readings": {name: way for name, (way, _) in readings_of(self.model).items()}}
+        document |= {} if self.shaft is None else {"cage_speed_ratio": 1 / self.shaft}
+        document |= {"load_N": float(self.model.load)} if self.with_rollers else {}
+        document |= {} if self.file is None else {"left_as_in_template": left, "best_guesses": guesses}
+        notes = {
+            "Readings": [*filter(None, [jc.show.readings_words(self.model)])],
+            "As the template has them, of another bearing": left,
+            "Best guesses of values known within ranges only": guesses,
         }
-        return [f"{what}: {', '.join(values)}" for what, values in each.items() if values]
+        return document, [f"{what}: {', '.join(values)}" for what, values in notes.items() if values]
 
 
-def read_case(given: str, load: float | None = None) -> Subject:
-    """A case or TOML file by its name, under a load [N] if one is given.
+def read_case(given: str) -> Subject:
+    """A case or TOML file by its name.
 
     A broken design rule and an oil that is too thin are reported on standard error.
 
-    **Raises:** `InputError`, also for the load of a cage, whose forces do not follow from it.
+    **Raises:** `InputError`.
     """
     cases, bearings = jc.bearing.PUBLISHED_CASES, jc.models.WHOLE_BEARINGS
     if given in cases:
@@ -179,7 +181,7 @@ def read_case(given: str, load: float | None = None) -> Subject:
     elif Path(given).suffix.lower() == ".toml" or os.path.exists(given):
         read = jc.files.read_bearing if jc.files.subject_of(given) == "cage" else jc.files.read_whole_bearing
         file, name = read(given), "".join(c if c.isprintable() and c != "$" else "_" for c in Path(given).stem)
-        found = Subject(name, file.model, None, file)
+        found = Subject(name, file.model, None, file, given)
     elif given.lower() in bearings:
         found = Subject(given.lower(), jc.whole_bearing(given))
     else:
@@ -189,6 +191,4 @@ def read_case(given: str, load: float | None = None) -> Subject:
         say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
     for doubt in found.model.lubricant.doubts():
         say(f"Warning: {doubt}")
-    if load is not None and not found.with_rollers:
-        raise InputError(f"Option --load goes with a bearing with its rollers, but {found.name} is a cage.")
-    return found if load is None else dataclasses.replace(found, model=jc.replace(found.model, load=load))
+    return found

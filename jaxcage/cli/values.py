@@ -1,6 +1,7 @@
 """`NAME=VALUES` of options read into numbers: a grid, single values, an interval, a tolerance, with units."""
 
 import itertools
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -21,6 +22,7 @@ USUAL = {"guidance_gap": (0.7, 1.4), "eccentricity": (0.2, 2.5)}
 """Parameters that are varied if none is named, and the bounds as parts of their values."""
 WITH_ROLLERS = {"pocket_clearance": (0.7, 1.4), "land_width": (0.7, 1.4)}
 """The same of a bearing with its rollers, beside those of a cage."""
+GRADE = re.compile(r"G\s*(\d+(?:\.\d*)?)", re.IGNORECASE)
 
 
 def read_vary(given: Sequence[str], subject: Subject) -> dict[str, Any]:
@@ -28,7 +30,7 @@ def read_vary(given: Sequence[str], subject: Subject) -> dict[str, Any]:
 
     **Raises:** `InputError`.
     """
-    found = read_each("--vary", given, f"NAME=VALUES with {FORMS}", lambda name, text: _read(name, text, subject))
+    found = _read_each("--vary", given, f"NAME=VALUES with {FORMS}", lambda name, text: _read(name, text, subject))
     if SPEED not in found:
         raise InputError("Option --vary must be given for the speed too, e.g. --vary speed=12000rpm.")
     _check_corners(found, subject)
@@ -54,7 +56,7 @@ def read_bounds(given: Sequence[str], subject: Subject) -> dict[str, tuple[float
             raise InputError(f"Option --vary must name one of {', '.join(names)}, but names '{name}'.")
         return between
 
-    found = read_each("--vary", given, "a parameter's NAME=LOWER:UPPER", read)
+    found = _read_each("--vary", given, "a parameter's NAME=LOWER:UPPER", read)
     _check_corners(found, subject)
     return {name: between.bounds for name, between in found.items()}
 
@@ -76,11 +78,38 @@ def no_worse_balance(model: Any, vary: dict[str, tuple[float, float]]) -> list[s
     return [f"Balance may only get better: eccentricity of at most {own * 1e6:g} um (--worse-balance lifts that)."]
 
 
-def read_each(option: str, given: Sequence[str], form: str, read: Callable[[str, str], Any]) -> dict[str, Any]:
-    """What `read` makes of every `NAME=VALUES`, by name; its `ValueError` becomes a sentence about that name."""
+def read_tolerances(text: str, subject: Subject, fastest: float) -> dict[str, Any]:
+    """`NAME=±X, NAME=G6.3, ...` in SI units; a grade is that at the largest cage speed [rad/s].
+
+    **Raises:** `InputError`.
+    """
+    info, now = jc.parameter_info(subject.model), jc.parameters(subject.model)
+
+    def read(name: str, words: str) -> Any:
+        if name not in info:
+            raise InputError(f"Option --tolerance must name a parameter of the cage, but names '{name}'.")
+        if (grade := GRADE.fullmatch(words)) is not None:
+            if name != "eccentricity":
+                raise ValueError("cannot have a balance grade, which is one of the eccentricity.")
+            return jc.Tolerance.balanced(float(grade[1]), fastest)
+        sign, width = words[:1], words[1:].strip()
+        if sign != "±":
+            raise ValueError(f"must be ±X with a unit, ±X % or a grade such as G6.3, but is {words}.")
+        if width.endswith("%"):
+            half = abs(float(now[name])) * float(width[:-1]) / 100
+        else:
+            half = jc.files.to_si(width, info[name].unit)
+        return jc.Tolerance(-half, half)
+
+    parts = [part.strip() for part in text.split(",") if part.strip()]
+    return _read_each("--tolerance", parts, "NAME=±X or eccentricity=G6.3", read)
+
+
+def _read_each(option: str, given: Sequence[str], form: str, read: Callable[[str, str], Any]) -> dict[str, Any]:
+    """Read every `NAME=VALUES` by `read`, whose `ValueError` becomes a sentence about that name."""
     found: dict[str, Any] = {}
     for text in given:
-        name, _, values = (part.strip() for part in text.partition("="))
+        name, _, values = (part.strip() for part in text.replace("+-", "±").partition("="))
         if not values:
             raise InputError(f"Option {option} must be {form}, but '{text}' was given.")
         if name in found:
@@ -97,24 +126,24 @@ def read_each(option: str, given: Sequence[str], form: str, read: Callable[[str,
 
 
 def _read(name: str, text: str, subject: Subject) -> Any:
-    info, parts, tolerance = jc.parameter_info(subject.model), text.split(":"), text.replace("+-", "±").split("±", 1)
+    info, parts, tolerance = jc.parameter_info(subject.model), text.split(":"), text.split("±", 1)
     if name not in (names := [SPEED, OIL, *info]):
         raise InputError(f"Option --vary must name one of {', '.join(names)}, but names '{name}'.")
 
     def number(part: str) -> float:
         if name == SPEED:
-            return subject.speed(read_quantity(part.strip(), "rpm"), "vary")
+            return jc.rpm(subject.rpm(read_quantity(part.strip(), "rpm"), "vary"))
         return jc.files.to_si(part, info[name].unit if name in info else "1")
 
     if len(tolerance) == 2:
         return jc.lanes.Tolerance(*map(number, tolerance))
     if len(parts) == 2:
         return jc.lanes.Between(*map(number, parts))
-    if len(parts) == 3 and not (parts[2].strip().isdecimal() and 1 <= int(parts[2]) <= MOST):
-        raise ValueError(f"must have a number of values from 1 to {MOST} at its end, but has '{parts[2]}'.")
     if len(parts) > 3:
         raise ValueError(f"must have {FORMS}, but '{text}' was given.")
     if len(parts) == 3:
+        if not (parts[2].strip().isdecimal() and 1 <= int(parts[2]) <= MOST):
+            raise ValueError(f"must have a number of values from 1 to {MOST} at its end, but has '{parts[2]}'.")
         found = np.linspace(number(parts[0]), number(parts[1]), int(parts[2]))
     else:
         found = np.array([*map(number, text.split(","))])

@@ -24,9 +24,11 @@ from .progress import (
     FILES_ARE_WHOLE,
     end_at_once_when_interrupted,
     interrupted_status,
+    progress,
     say,
-    shorten_cache_warnings,
+    shorten_warnings,
 )
+from .subject import read_case
 
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
@@ -37,8 +39,6 @@ FUNCTIONS: tuple[Callable[..., Answer], ...] = (
     *(speed.poincare, case.statics, case.report),
 )
 COMMANDS = {function.__name__.rstrip("_"): function for function in FUNCTIONS}
-COMPLETION, SHELLS = ("--tyro-print-completion", "--tyro-write-completion"), ("bash", "zsh", "tcsh", "fish")
-"""Options that tyro takes by itself, and the values that it asserts."""
 CALLED = {"directions": "by", "lanes": "chunk", "samples": "sample", "settle": "discard", "confirm": "no_confirm"}
 CALLED |= {"method": "solver", "centrifugal_force": "shaft_speed", "blocks": "revolutions", "store": "out"}
 CALLED |= {"x": "points", "y": "points"}
@@ -77,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(call: functools.partial[Answer]) -> None:
-    """Run a command, write its files, and print its answer."""
+    """Read the case, run a command on it, write its files, and print its answer."""
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA writes pages about each program that it finds compiled
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells where it stores fonts if there is no home folder
     import jax
@@ -87,12 +87,10 @@ def _run(call: functools.partial[Answer]) -> None:
     if show is not None and show.no_cache:
         os.environ["JAXCAGE_CACHE"] = "off"
     elif show is not None:
-        shorten_cache_warnings()
+        shorten_warnings()
         keep_compiled_programs()
-    began = time.perf_counter()
     try:
-        answer = call()
-        answer = complete(answer, call.func.__name__.rstrip("_"), show, time.perf_counter() - began)
+        answer = call() if show is None else _of_a_case(call, show)
     except ArgumentError as error:
         raise _about_options(error, call) from error
     except jax.errors.JaxRuntimeError as error:
@@ -102,6 +100,21 @@ def _run(call: functools.partial[Answer]) -> None:
     print_answer(answer, call.keywords["json"] if show is None else show.json)
     if answer.failure:
         raise NoResult(answer.failure)
+
+
+def _of_a_case(call: functools.partial[Answer], show: ShowOptions) -> Answer:
+    """The answer of a command about a case, with its files; nothing is computed that cannot be written."""
+    from ..files import check_writable
+
+    began, command, given = time.perf_counter(), call.func.__name__.rstrip("_"), call.keywords
+    cases = {name: read_case(given[name]) for name in ("subject", "other") if name in given}
+    if call.func is not case.statics:  # which takes the load of a cage, too
+        load = given["means"].load if "means" in given else given.get("load")
+        cases["subject"] = cases["subject"].under(load)
+    check_writable(show.out)
+    with progress(f"{command} {cases['subject'].name}"):
+        answer = call(**cases)
+    return complete(answer, command, cases["subject"], show.out, time.perf_counter() - began)
 
 
 def _about_options(error: ArgumentError, call: functools.partial[Answer]) -> Exception:
@@ -140,10 +153,6 @@ def _parse(arguments: list[str]) -> functools.partial[Answer] | None:
     if arguments == ["--version"]:
         print(f"jaxcage {__version__}")
         return None
-    if len(arguments) > 1 and arguments[0].replace("_", "-") in COMPLETION and arguments[1] not in SHELLS:
-        raise InputError(
-            f"Option {arguments[0]} must be followed by {', '.join(SHELLS)}, but '{arguments[1]}' was given."
-        )
     box = io.StringIO()
     try:
         with contextlib.redirect_stderr(box):

@@ -1,23 +1,23 @@
 """Tables, figures and the report: numbers and data sets as people read them, with units converted when they are shown.
 
-| module            | responsibility                                                        |
-|-------------------|-----------------------------------------------------------------------|
-| `tables`          | columns of numbers with units                                         |
-| `columns`         | time histories, strobe points and branches as CSV                     |
-| `style`           | colours, frames, legends, figures, axes                               |
-| `diagrams`        | sweeps over speed: orbits, exponents, quantities, zones; comparisons  |
-| `run_figures`     | one run of a cage or of a bearing with its rollers, roller loads      |
-| `orbit_figures`   | branches of periodic orbits, Floquet multipliers                      |
-| `maps`            | bifurcation curves, exponents and labels over speed and a parameter   |
-| `design_figures`  | elasticities, searches for better designs, chances of chaos           |
-| `zone_tables`     | zones found in a sweep or by a search, bifurcations, stable stretches |
-| `gradient_tables` | derivatives of edges, of lasting chaos, of means                      |
-| `quantity_tables` | quantities over speed and of one run, statics, two designs compared   |
-| `design_tables`   | designs before and after a search, shares of variance, tolerances     |
-| `chance_tables`   | chances of chaos, ranges that measurements narrowed                   |
-| `sources`         | parameters with their sources                                         |
-| `findings`        | everything that a report shows, computed; operating speeds and zones  |
-| `report`          | the report as HTML, made of sections                                  |
+| module             | responsibility                                                        |
+|--------------------|-----------------------------------------------------------------------|
+| `tables`           | records and columns with units                                        |
+| `columns`          | time histories, strobe points and branches as CSV                     |
+| `style`            | colours, frames, legends, figures, axes                               |
+| `diagrams`         | sweeps over speed: orbits, exponents, quantities, zones; comparisons  |
+| `run_figures`      | one run of a cage or of a bearing with its rollers, roller loads      |
+| `orbit_figures`    | branches of periodic orbits, Floquet multipliers                      |
+| `maps`             | bifurcation curves, exponents and labels over speed and a parameter   |
+| `design_figures`   | elasticities, searches for better designs, chances of chaos           |
+| `zone_tables`      | zones found in a sweep or by a search, bifurcations, stable stretches |
+| `slope_tables`     | derivatives of edges, of lasting chaos, of means                      |
+| `quantity_tables`  | quantities over speed and of one run, statics                         |
+| `parameter_tables` | parameters with their sources, two designs compared                   |
+| `design_tables`    | designs before and after a search, shares of variance, tolerances     |
+| `chance_tables`    | chances of chaos, ranges that measurements narrowed                   |
+| `operating`        | operating speeds and their place among the zones                      |
+| `report`           | answers of commands as one page of HTML                               |
 """
 
 from .chance_tables import (
@@ -60,27 +60,6 @@ from .diagrams import (
     published_edges as published_edges,
     quantities_beside as quantities_beside,
     sweep_figure as sweep_figure,
-    sweeps_beside as sweeps_beside,
-)
-from .findings import (
-    Findings as Findings,
-    Operating as Operating,
-    examine as examine,
-    read_operating as read_operating,
-    require_some as require_some,
-)
-from .gradient_tables import (
-    FIRST as FIRST,
-    edge_slopes as edge_slopes,
-    elasticities_table as elasticities_table,
-    gradient_table as gradient_table,
-    lasting_table as lasting_table,
-    mean_gradient_tables as mean_gradient_tables,
-    missing_notes as missing_notes,
-    not_fixed as not_fixed,
-    source_notes as source_notes,
-    to_be_turned as to_be_turned,
-    width_table as width_table,
 )
 from .maps import (
     Axis as Axis,
@@ -91,47 +70,61 @@ from .maps import (
     stability_map as stability_map,
     top_exponent as top_exponent,
 )
+from .operating import (
+    Operating as Operating,
+    assess as assess,
+    calmest as calmest,
+    read_operating as read_operating,
+    verdict_table as verdict_table,
+)
 from .orbit_figures import (
     multiplier_circle as multiplier_circle,
     orbit_diagram_with_branches as orbit_diagram_with_branches,
 )
-from .quantity_tables import (
+from .parameter_tables import (
     differences as differences,
     differences_table as differences_table,
+    readings_words as readings_words,
+    sources_table as sources_table,
+)
+from .quantity_tables import (
+    column_of as column_of,
     displacements as displacements,
-    head_of as head_of,
     mean_over_starts as mean_over_starts,
     quantities_table as quantities_table,
     run_tables as run_tables,
     statics_table as statics_table,
 )
-from .report import assess as assess, page as page, verdict_table as verdict_table
+from .report import PAPER as PAPER, Section as Section, page as page, settings_table as settings_table
 from .run_figures import (
     load_bars as load_bars,
     rollers_of as rollers_of,
     run_figure as run_figure,
     strobe_section as strobe_section,
 )
-from .sources import readings_words as readings_words
-from .style import drawn as drawn, new_figure as new_figure
-from .tables import (
-    Column as Column,
-    Table as Table,
-    counted as counted,
-    rows_table as rows_table,
-    shares_table as shares_table,
+from .slope_tables import (
+    FIRST as FIRST,
+    edge_slopes as edge_slopes,
+    elasticities_table as elasticities_table,
+    gradient_table as gradient_table,
+    lasting_table as lasting_table,
+    mean_gradient_tables as mean_gradient_tables,
+    residual_words as residual_words,
+    source_notes as source_notes,
+    to_be_turned as to_be_turned,
+    width_table as width_table,
 )
+from .style import drawn as drawn, new_figure as new_figure
+from .tables import Column as Column, Table as Table, counted as counted, shares_table as shares_table, table as table
 from .zone_tables import (
     coexisting_notes as coexisting_notes,
     edge_table as edge_table,
     loss_table as loss_table,
-    orbits_document as orbits_document,
+    motion_tables as motion_tables,
+    point_record as point_record,
+    require_some as require_some,
     stretch_table as stretch_table,
-    stretches_table as stretches_table,
-    transient_tables as transient_tables,
     unsettled_notes as unsettled_notes,
-    zone_details as zone_details,
     zone_span as zone_span,
     zone_words as zone_words,
-    zones_table as zones_table,
 )

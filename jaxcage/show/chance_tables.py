@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..design import Clue, Ensemble, Narrowed, verdict_of
+from ..design import Clue, Ensemble, Narrowed
 from ..files import Measurement, Range
-from .tables import Beside, Column, Table, chosen, rows_table, speed_columns
+from .tables import Beside, Column, Table, chosen, speed_columns, table
 
 
 MOST = 3
@@ -41,22 +41,16 @@ def chances_tables(name: str, found: Ensemble, beside: Beside = None) -> list[Ta
         row |= {"verdict": WORDS.get(verdict, verdict), "chance": span(100 * known, " %") if known.size else None}
         stretches.append(row | {"95 % bars": span(100 * np.concatenate([low[part], high[part]]), " %")})
     columns = [column for end in ("from", "to") for column in speed_columns(end, end, beside)]
-    columns += [Column(head, ()) for head in ("verdict", "chance", "95 % bars", "failed draws")]
-    draws = f"{found.place.shape[0]} draws from {len(found.unknowns)} ranges"
-    chances = rows_table(f"Chance of chaos of {name}, {draws} [rpm]", stretches, columns)
-    return [chances, unknowns_table(found, found.clues())]
-
-
-def unknowns_table(found: Ensemble, clues: Sequence[Clue]) -> Table:
-    """Ranges, how to measure each value, and its share of the verdict, the largest first."""
-    shares = {c.label: c.share for c in clues}
+    title = f"Chance of chaos of {name}, {len(found.place)} draws from {len(found.unknowns)} ranges [rpm]"
+    chances = table(title, stretches, [*columns, "verdict", "chance", "95 % bars", "failed draws"])
+    shares = {clue.label: clue.share for clue in found.clues()}
     each = zip(found.unknowns, found.units or len(found.unknowns) * ("",), found.sources, strict=True)
     rows = [
         {"value": u.label, "range": range_words(u.range, unit), "share": shares.get(u.label), "measure": source}
         for u, unit, source in sorted(each, key=lambda row: -shares.get(row[0].label, 0.0))
     ]
-    columns = [Column("value", ()), Column("range", ()), Column("of the verdict", (), "1", "%", key="share", digits=0)]
-    return rows_table("Unknown values", rows, columns, "unknowns")
+    share = Column("of the verdict", "share", shown="%", digits=0)
+    return [chances, table("Unknown values", rows, ["value", "range", share], "unknowns")]
 
 
 def range_words(found: Range, unit: str) -> str:
@@ -66,7 +60,7 @@ def range_words(found: Range, unit: str) -> str:
 
 
 def chances_answer(found: Ensemble) -> str:
-    """What the known values decide, and what to do about the rest, in a sentence."""
+    """A sentence that says what the known values decide, and what to do about the rest."""
     if count := int(np.sum(found.undecided)):
         said = f"Known values do not decide between calm and chaotic at {count} of {found.rpm.size} speeds."
         return f"{said} {measures_words(found.clues())}"
@@ -99,33 +93,15 @@ def measures_words(clues: Sequence[Clue]) -> str:
     return f"Measure {'; '.join(f'{c.label} ({c.source}), {c.share:.0%} of the verdict' for c in telling)}."
 
 
-def operating_chances(found: Ensemble, operating: Sequence[Any], ratio: float) -> Table:
-    """Verdicts at operating speeds; of a range, the chance that some speed in it is chaotic."""
-    rows = []
-    for at in operating:
-        which = found.between(at.low_rpm, at.high_rpm)
-        done = ~np.any(found.failed[:, which], axis=1) | np.any(found.chaotic[:, which], axis=1)
-        hits, of = int(np.sum(np.any(found.chaotic[done][:, which], axis=1))), int(np.sum(done))
-        verdict = verdict_of(hits, of, len(done))
-        row = {"cage speed": str(at), "shaft speed": str(at.of_shaft(ratio)), "verdict": WORDS.get(verdict, verdict)}
-        clues = measures_words(found.clues(which)) if verdict == "not decided" else None
-        rows.append(row | {"chance": hits / of if of else None, "measure": clues})
-    columns = [Column("cage speed", ()), Column("shaft speed", ()), Column("chance", (), "1", "%", digits=0)]
-    return rows_table(
-        "Operating speeds, by known values", rows, [*columns, Column("verdict", ()), Column("measure", ())]
-    )
-
-
 def measured_table(found: Narrowed, measured: Sequence[Measurement], beside: Beside = None) -> Table:
     """The distance of the best draw from each measurement."""
     rows = [
         {"what": str(m), "measured": m.quantity, "rpm": m.cage_rpm, "value": m.words, "off_by_tolerances": float(off)}
         for m, off in zip(measured, found.nearest, strict=True)
     ]
-    columns = [Column("measured", ()), *speed_columns("cage [rpm]", "rpm", beside), Column("value", ())]
-    columns.append(Column("off", (), key="off_by_tolerances", digits=2))
+    columns = ["measured", *speed_columns("cage [rpm]", "rpm", beside), "value"]
     title = "Measurements, and how far the nearest draw is off [tolerances]"
-    return rows_table(title, rows, columns, "measurements")
+    return table(title, rows, [*columns, Column("off", "off_by_tolerances", digits=2)], "measurements")
 
 
 def narrowed_table(found: Narrowed, units: Mapping[str, str]) -> Table:
@@ -135,5 +111,5 @@ def narrowed_table(found: Narrowed, units: Mapping[str, str]) -> Table:
         before, after = (range_words(each, units[u.label]) for each in (u.range, r))
         row = {"value": u.label, "before": before, "after": after if worth else "as it was", "share": float(share)}
         rows.append(row | chosen(r, "lower upper") | {"narrowed": bool(worth)})
-    columns = [Column("value", ()), Column("before", ()), Column("after", ())]
-    return rows_table("Ranges", rows, [*columns, Column("left of it", (), "1", "%", key="share", digits=0)], "ranges")
+    left = Column("left of it", "share", shown="%", digits=0)
+    return table("Ranges", rows, ["value", "before", "after", left], "ranges")

@@ -1,8 +1,8 @@
-"""Time histories, strobe points and branches as CSV: one column per quantity, its unit in the head."""
+"""Time histories, strobe points and branches as CSV: one column per quantity, its SI unit in the head."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from ..orbits import Branch, Curve
     from .maps import Axis
 
+Columns = dict[str, Shaped[np.ndarray, " rows"]]
+
 
 def write_columns(path: str | Path, columns: Mapping[str, Shaped[np.ndarray, " rows"]]) -> Path:
     """Write columns of one length under their names; nothing is left behind if that fails."""
@@ -27,46 +29,24 @@ def write_columns(path: str | Path, columns: Mapping[str, Shaped[np.ndarray, " r
     return Path(path)
 
 
-def trajectory_columns(
-    trajectory: Trajectory, forces: Mapping[str, Float[np.ndarray, "samples 2"]] | None = None
-) -> dict[str, Float[np.ndarray, " samples"]]:
-    """Time, phase, state and each force of a trajectory in SI units, heads such as `y_C [m]` and
-    `film_y [N]`.
-    """
-    columns = {"time [s]": trajectory.time, "tau [rad]": trajectory.tau}
-    for i, name in enumerate(component_names(trajectory.state.shape[1])):
-        columns[f"{name} [{quantity(name).unit}]"] = trajectory.state[:, i]
-    for name, force in (forces or {}).items():
+def _joined(parts: Iterable[Any]) -> np.ndarray:
+    return np.concatenate([np.asarray(part) for part in parts])
+
+
+def _of_states(states: Float[np.ndarray, "rows dim"]) -> Columns:
+    names = component_names(states.shape[1])
+    return {f"{name} [{quantity(name).unit}]": states[:, i] for i, name in enumerate(names)}
+
+
+def trajectory_columns(trajectory: Trajectory, forces: Mapping[str, Float[np.ndarray, "samples 2"]]) -> Columns:
+    """Time, phase, state and each force of a trajectory, heads such as `y_C [m]` and `film_y [N]`."""
+    columns = {"time [s]": trajectory.time, "tau [rad]": trajectory.tau, **_of_states(trajectory.state)}
+    for name, force in forces.items():
         columns |= {f"{name}_{axis} [N]": force[:, i] for i, axis in enumerate("xy")}
     return {name: np.asarray(column) for name, column in columns.items()}
 
 
-def strobe_columns(found: xr.Dataset) -> dict[str, Shaped[np.ndarray, " points"]]:
-    """Strobe points of all lanes of a sweep at its first speed, in SI units."""
-    states = found["strobe"].isel(speed=0).stack(point=("start", "revolution")).transpose("point", "component")
-    columns = {"start": states["start"].values + 1, "revolution": states["revolution"].values}
-    names = found["component"].values.tolist()
-    return columns | {f"{name} [{quantity(name).unit}]": states.values[:, i] for i, name in enumerate(names)}
-
-
-def branch_columns(branches: Sequence["Branch"]) -> dict[str, Shaped[np.ndarray, " orbits"]]:
-    """All orbits of branches over speed: which branch, speed, state and multipliers."""
-    count = branches[0].state.shape[1]
-    joined = lambda rows: np.concatenate([np.asarray(row) for row in rows])
-    columns = {
-        "branch": joined(np.full(b.value.size, i) for i, b in enumerate(branches)),
-        "speed [rpm]": joined(b.speed_rpm for b in branches),
-        "stable": joined(b.stable for b in branches),
-    }
-    for k, name in enumerate(component_names(count)):
-        columns[f"{name} [{quantity(name).unit}]"] = joined(b.state[:, k] for b in branches)
-    for k in range(count):
-        columns[f"multiplier {k + 1} (real part)"] = joined(np.real(b.multipliers[:, k]) for b in branches)
-        columns[f"multiplier {k + 1} (imaginary part)"] = joined(np.imag(b.multipliers[:, k]) for b in branches)
-    return columns
-
-
-def roller_columns(history: "RollerHistory") -> dict[str, Shaped[np.ndarray, " samples"]]:
+def roller_columns(history: "RollerHistory") -> Columns:
     """Time history of a bearing: cage, land, and each roller."""
     columns = {"time [s]": history.time, "cage angle [rad]": history.angle}
     columns |= {f"cage place {axis} over clearance": history.place[:, i] for i, axis in enumerate("xy")}
@@ -77,10 +57,29 @@ def roller_columns(history: "RollerHistory") -> dict[str, Shaped[np.ndarray, " s
     return columns
 
 
-def curve_columns(curves: Sequence["Curve"], axis: "Axis") -> dict[str, Shaped[np.ndarray, " points"]]:
+def strobe_columns(found: xr.Dataset) -> Columns:
+    """Strobe points of all lanes of a sweep at its first speed."""
+    states = found["strobe"].isel(speed=0).stack(point=("start", "revolution")).transpose("point", "component")
+    columns = {"start": states["start"].values + 1, "revolution": states["revolution"].values}
+    return columns | _of_states(states.values)
+
+
+def branch_columns(branches: Sequence["Branch"]) -> Columns:
+    """All orbits of branches over speed: which branch, speed, state and multipliers."""
+    columns = {
+        "branch": _joined(np.full(b.value.size, i) for i, b in enumerate(branches)),
+        "speed [rpm]": _joined(b.speed_rpm for b in branches),
+        "stable": _joined(b.stable for b in branches),
+        **_of_states(_joined(b.state for b in branches)),
+    }
+    for k, mu in enumerate(_joined(b.multipliers for b in branches).T, start=1):
+        columns |= {f"multiplier {k} (real part)": mu.real, f"multiplier {k} (imaginary part)": mu.imag}
+    return columns
+
+
+def curve_columns(curves: Sequence["Curve"], axis: "Axis") -> Columns:
     """Points of curves over speed and a parameter, in the units in which these are shown."""
-    joined = lambda rows: np.concatenate([np.asarray(row) for row in rows])
-    columns = {"curve": joined(np.full(c.x_value.size, i) for i, c in enumerate(curves, start=1))}
-    columns["speed [rpm]"] = joined(c.x_value for c in curves) * 30 / np.pi
-    columns[axis.head] = axis.shown(joined(c.y_value for c in curves))
-    return columns | {"genuine": joined(c.genuine for c in curves)}
+    columns = {"curve": _joined(np.full(c.x_value.size, i) for i, c in enumerate(curves, start=1))}
+    columns["speed [rpm]"] = _joined(c.x_value for c in curves) * 30 / np.pi
+    columns[axis.column.title] = axis.shown(_joined(c.y_value for c in curves))
+    return columns | {"genuine": _joined(c.genuine for c in curves)}

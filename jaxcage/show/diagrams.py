@@ -3,8 +3,8 @@
 Every figure reads the data set of a sweep, its units and its coordinates, whatever model was swept.
 """
 
-import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import cycle
 from typing import Any
 
@@ -15,13 +15,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
 from matplotlib.transforms import offset_copy
 
-from ..analysis import CHAOS_THRESHOLD, Stretch, Zone, Zones, failed
+from ..analysis import CHAOS_THRESHOLD, Stretch, Zones, failed
 from ..bearing import PublishedCase
 from ..quantities import quantity
 from . import style
-from .quantity_tables import SHARES, head_of, mean_over_starts
-from .tables import SHOWN, factor
-from .zone_tables import published_zones, zone_span
+from .quantity_tables import column_of, mean_over_starts
+from .zone_tables import zone_span
 
 
 Span = tuple[float, float]
@@ -29,6 +28,10 @@ Span = tuple[float, float]
 CAGE, SHAFT = "Cage speed $n$ [rpm]", "Shaft speed [rpm]"
 BELOW = 36.0
 """Distance of the axis of the other speed from that of the speed [points]."""
+SWEPT = ("cage_slip", "pocket_force_mean_sum_N", "pocket_force_max_N", "friction_power_W", "synchronous_force_x_N")
+"""Quantities of a whole bearing in the figure of a sweep."""
+BESIDE_COLOURS = (style.BLUE, style.VERMILION, *style.LINE_COLOURS[1:4])
+"""Colours of designs beside each other."""
 
 
 def label_speed(ax: Axes, speed: xr.Dataset | str = "cage speed") -> Axes:
@@ -46,47 +49,38 @@ def speed_limits(sweep: xr.Dataset) -> Span:
     return (first, last) if last > first else (first - 50, first + 50)
 
 
-def add_shaft_axes(figure: Figure, speeds: xr.Dataset | float, axes: Sequence[Axes] | None = None) -> Figure:
+def add_shaft_axes(figure: Figure, speeds: xr.Dataset | float) -> Figure:
     """Add a second axis beneath every axis of the cage speed, for the speed of the shaft.
 
-    **Arguments:** figure; a sweep, whose coordinates include both speeds, or the cage speed over the shaft speed; axes
-    of the figure, by default all.
+    **Arguments:** figure; a sweep, whose coordinates include both speeds, or the cage speed over the shaft speed.
 
     **Returns:** the same figure. A sweep over another speed, and axes that have their second axis, stay as they are.
     """
     if isinstance(speeds, xr.Dataset):
         if "shaft_rpm" not in speeds.coords:
             return figure
-        cage, shaft = speeds["rpm"].values, speeds["shaft_rpm"].values
-        ratio = float(cage[-1] / shaft[-1])
-    else:
-        ratio = speeds
-    for ax in figure.axes if axes is None else axes:
+        speeds = float(speeds["rpm"][-1] / speeds["shaft_rpm"][-1])
+    for ax in figure.axes:
         if ax.get_xlabel() == CAGE and not any(child.get_xlabel() == SHAFT for child in ax.child_axes):
-            _add_below(ax, ratio)
+            _add_below(ax, speeds)
     return figure
 
 
 def _add_below(ax: Axes, ratio: float) -> None:
-    move = lambda points: offset_copy(ax.transAxes, ax.figure, y=-points, units="points")  # pyright: ignore
-    shaft = ax.secondary_xaxis(
-        0.0, functions=(lambda x: np.asarray(x) / ratio, lambda x: np.asarray(x) * ratio), transform=move(BELOW)
-    )
+    beneath = offset_copy(ax.transAxes, ax.figure, y=-BELOW, units="points")  # pyright: ignore
+    both = (lambda x: np.asarray(x) / ratio, lambda x: np.asarray(x) * ratio)
+    shaft = ax.secondary_xaxis(0.0, functions=both, transform=beneath)
     shaft.set_xlabel(SHAFT)
     shaft.xaxis.set_major_formatter(StrMethodFormatter("{x:.0f}"))
     shaft.tick_params(color=style.GREY, labelsize=9)
     shaft.spines["bottom"].set(color=style.GREY, linewidth=0.8)
-    legend = ax.get_legend()
-    if legend is not None and legend.get_bbox_to_anchor().y1 < ax.get_window_extent().y0:  # it was beneath already
-        legend.set_loc("upper center")
-        legend.set_bbox_to_anchor((0.5, 0.0), transform=move(2 * BELOW))
 
 
 def shade_zones(ax: Axes, zones: Zones | Sequence[Stretch]) -> Axes:
     """Shade the chaotic zones, an open one to the end of the axis; or stretches of speed by the motion of the cage."""
     low, high = ax.get_xlim()
     if isinstance(zones, Zones):
-        shaded = [("chaotic zone", style.ZONE, 1.0, span) for span in (zone_span(z, low, high) for z in zones.zones)]
+        shaded = [("chaotic zone", style.ZONE, 1.0, zone_span(zone, low, high)) for zone in zones.zones]
     else:
         colour_of = lambda labels: style.MOTION_COLOURS.get("".join(labels), style.GREY)
         motion = lambda labels: " or ".join(labels).replace("_", " ")
@@ -102,11 +96,8 @@ def shade_zones(ax: Axes, zones: Zones | Sequence[Stretch]) -> Axes:
 
 def published_edges(published: PublishedCase) -> dict[str, float]:
     """The published edges of a case [rpm] by name."""
-    return {
-        "zone 1 onset": published.zone_1_onset_rpm,
-        "zone 1 exit": published.zone_1_exit_rpm,
-        "zone 2 onset": published.zone_2_onset_rpm,
-    }
+    names = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
+    return {name: getattr(published, f"{name.replace(' ', '_')}_rpm") for name in names}
 
 
 def mark_published(ax: Axes, published: PublishedCase, text: bool = True) -> Axes:
@@ -128,71 +119,14 @@ def mark_published(ax: Axes, published: PublishedCase, text: bool = True) -> Axe
     return ax
 
 
-def mark_operating(ax: Axes, spans: Sequence[Span]) -> Axes:
-    """Mark operating speeds [rpm]: a line for a speed, a light band for a range."""
+def mark_operating(ax: Axes, spans: Sequence[Span]) -> None:
+    """Mark operating speeds [rpm] inside the axis: a line for a speed, a light band for a range."""
     low, high = ax.get_xlim()
-    for i, (first, last) in enumerate(span for span in spans if span[1] >= low and span[0] <= high):
-        label = "operating speed" if i == 0 else "_operating speed"
+    for first, last in (span for span in spans if span[1] >= low and span[0] <= high):
         for edge in {first, last}:
-            ax.axvline(edge, color=style.PURPLE, linewidth=1.1, linestyle=(0, (6, 2)), zorder=2, label=label)
-            label = "_operating speed"
-        if last > first:
-            ax.axvspan(first, last, color=style.PURPLE, alpha=0.12, linewidth=0, zorder=0.5)
+            ax.axvline(edge, color=style.PURPLE, linewidth=1.1, linestyle=(0, (6, 2)), zorder=2)
+        ax.axvspan(first, last, color=style.PURPLE, alpha=0.12, linewidth=0, zorder=0.5)
     ax.set_xlim(low, high)
-    return ax
-
-
-def zone_strip(
-    loss: Sequence[Zone],
-    chaotic: Sequence[Zone],
-    limits_rpm: Span,
-    operating: Sequence[Span] = (),
-    published: PublishedCase | None = None,
-    ax: Axes | None = None,
-) -> Axes:
-    """One row of bars for each kind of zone; operating speeds in a row on top, with lines through all rows.
-
-    **Arguments:** synchronous-loss and chaotic zones; ends of the sweep, operating speeds and ranges [rpm]; the
-    published case; axes. An open zone reaches to the end of the axis.
-    """
-    rows: list[tuple[str, str, Sequence[Span]]] = [("operating", style.PURPLE, operating)] if operating else []
-    for name, colour, zones in (("synchronous loss", style.BLUE, loss), ("chaotic", style.VERMILION, chaotic)):
-        rows.append((name, colour, [zone_span(zone, *limits_rpm) for zone in zones]))
-    if published is not None:
-        ends = ((low, limits_rpm[1] if high is None else high) for low, high in published_zones(published))
-        rows.append(("published", style.GREY, [(low, high) for low, high in ends if high > low]))
-    ax = style.axes_or_new(ax, 9.5, 0.9 + 0.42 * len(rows))
-    low, high = limits_rpm
-    least = 0.003 * (high - low)  # a single speed must be visible
-    for i, (_, colour, spans) in enumerate(rows):
-        ax.barh(i, high - low, left=low, height=0.62, color=style.GREY, alpha=0.13, linewidth=0)
-        for first, last in spans:
-            width = max(last - first, least)
-            ax.barh(i, width, left=(first + last - width) / 2, height=0.62, color=colour, linewidth=0)
-    for edge in {edge for span in operating for edge in span}:
-        ax.axvline(edge, color=style.PURPLE, linewidth=1.0, linestyle=(0, (5, 2)), zorder=3)
-    ax.set(xlim=limits_rpm, ylim=(len(rows) - 0.5, -0.5))
-    ax.set_yticks(range(len(rows)), [name for name, _, _ in rows])
-    ax.tick_params(axis="y", length=0)
-    ax.grid(False, axis="y")
-    ax.spines[["left"]].set_visible(False)
-    return label_speed(ax)
-
-
-SWEPT = ("cage_slip", "pocket_force_mean_sum_N", "pocket_force_max_N", "friction_power_W", "synchronous_force_x_N")
-COMPARED = ("cage_slip", "friction_power_W", "pocket_impulse_N_s", "land_impulse_N_s", "pocket_wear_mm3_per_h")
-"""Quantities of a whole bearing in the figure of a sweep and in that of several bearings."""
-BESIDE_COLOURS = (style.BLUE, style.VERMILION, *style.LINE_COLOURS[1:4])
-"""Colours of designs beside each other."""
-
-
-def labelled(values: xr.DataArray) -> tuple[str, float]:
-    """Axis label of a variable with the unit in which it is shown, and the factor from its SI unit to that."""
-    unit, name = values.attrs.get("units", "1"), str(values.name)
-    if name == "exponents":
-        return quantity("largest_exponent").label, 1.0
-    shown = "%" if name in SHARES else SHOWN.get(unit, unit)
-    return f"{head_of(name, unit).capitalize()}{f' [{shown}]' if shown else ''}", factor(unit, shown)
 
 
 def reported(sweep: xr.Dataset, wanted: Sequence[str]) -> list[str]:
@@ -201,20 +135,15 @@ def reported(sweep: xr.Dataset, wanted: Sequence[str]) -> list[str]:
     return [name for name in wanted if name in every] or every[:6]
 
 
-def orbit_diagram(
-    sweep: xr.Dataset, component: int = 1, ax: Axes | None = None, *, limits_rpm: Span | None = None
-) -> Axes:
+def orbit_diagram(sweep: xr.Dataset, component: int = 1, ax: Axes | None = None) -> Axes:
     """Strobe states over speed from all initial states, coloured by label; failed lanes are crosses at the foot.
 
-    **Arguments:** sweep; component of the state (1: vertical displacement of a cage); axes; range of speed for a zoomed
-    diagram, whose vertical limits then fit the states in it.
+    **Arguments:** sweep; component of the state (1: vertical displacement of a cage); axes.
     """
     ax = style.axes_or_new(ax)
     named = quantity(str(sweep["component"].values[component]))
-    low, high = speed_limits(sweep) if limits_rpm is None else limits_rpm
-    inside = sweep.isel(speed=(sweep["rpm"].values >= low) & (sweep["rpm"].values <= high))
-    points, rpm = inside["strobe"].values[..., component] * named.factor, inside["rpm"].values
-    speeds, labels = np.broadcast_to(rpm[:, None, None], points.shape), inside["label"].values.astype(str)
+    points, rpm = sweep["strobe"].values[..., component] * named.factor, sweep["rpm"].values
+    speeds, labels = np.broadcast_to(rpm[:, None, None], points.shape), sweep["label"].values.astype(str)
     kind = np.where(np.char.startswith(labels, "periodic"), "periodic", labels)  # all periods together
     size = 1.8 if rpm.size > 150 else 2.5
     for label, colour in style.KIND_COLOURS.items():
@@ -222,11 +151,11 @@ def orbit_diagram(
         if np.any(lanes):
             look = style.dots(colour, size) | {"alpha": 0.5, "rasterized": True}
             ax.plot(speeds[lanes].ravel(), points[lanes].ravel(), **look, label=label)
-    lost = rpm[np.any(failed(inside), axis=1)]
+    lost = rpm[np.any(failed(sweep), axis=1)]
     if lost.size:
         foot = {"color": style.BLACK, "markersize": 4, "transform": ax.get_xaxis_transform()}
         ax.plot(lost, np.full(lost.size, 0.015), "x", **foot, label="failed")
-    ax.set(xlim=(low, high), ylim=style.padded_limits(points), ylabel=named.label)
+    ax.set(xlim=speed_limits(sweep), ylim=style.padded_limits(points), ylabel=named.label)
     return label_speed(ax, sweep)
 
 
@@ -259,93 +188,55 @@ def exponent_strip(sweep: xr.Dataset, ax: Axes | None = None) -> Axes:
 def _exponent_limits(values: np.ndarray, top: np.ndarray, band: np.ndarray) -> Span:
     """Limits that include every exponent and bar above zero, or the line of the largest exponents where all are
     negative."""
-    finite = values[np.isfinite(values)]
-    seen = (top + band)[np.isfinite(top + band)]
-    if finite.size == 0:
+    if not np.any(np.isfinite(values)):
         return -0.05, 0.1
-    high = max(0.1, 1.15 * float(finite.max()), 1.05 * float(seen.max(initial=0.0)))
-    calm = float(np.nanmin(top)) if float(finite.max()) <= 0 else 0.0
-    return max(min(1.15 * float(finite.min()), -0.05), min(1.15 * calm, -high)), high
+    least, most = float(np.nanmin(values)), float(np.nanmax(values))
+    high = max(0.1, 1.15 * most, 1.05 * float(np.nanmax(top + band)))
+    calm = float(np.nanmin(top)) if most <= 0 else 0.0
+    return max(min(1.15 * least, -0.05), min(1.15 * calm, -high)), high
+
+
+def _lines(ax: Axes, name: str, sweeps: dict[str, xr.Dataset]) -> Axes:
+    """A line over speed for each sweep: means of a variable over the initial states, with standard errors."""
+    for (text, sweep), colour in zip(sweeps.items(), cycle(BESIDE_COLOURS), strict=False):
+        column = column_of(sweep, name)
+        mean, error = (column.scale * x for x in mean_over_starts(sweep, name))
+        look: Any = dict(color=colour, linewidth=1.1, marker=".", elinewidth=0.8, label=text)
+        ax.errorbar(sweep["rpm"].values, mean, np.nan_to_num(error), **look)
+        ax.set_ylabel(column.label)
+        label_speed(ax, sweep)
+    return ax
+
+
+def _over_speed(draw: Sequence[Callable[[Axes], Axes]], title: str = "", first: float = 1.0) -> Figure:
+    """A figure of diagrams over one axis of speed, the first row so many times as high as the others."""
+    columns = 2 if len(draw) > 3 else 1
+    rows = -(-len(draw) // columns)
+    size, heights = (9.5 if columns == 1 else 11.5, 1.6 + 2.4 * rows), (first, *[1.0] * (rows - 1))
+    return style.panels(draw, columns, size, title, sharex=True, height_ratios=heights)
 
 
 def sweep_figure(
     sweep: xr.Dataset,
-    zones: Zones | Sequence[Stretch] | None = None,
+    zones: Zones | Sequence[Stretch],
     published: PublishedCase | None = None,
     title: str = "",
-    component: int = 1,
 ) -> Figure:
     """All that a sweep recorded: strobe states if there are any, quantities that the model reports, exponents.
 
-    **Arguments:** sweep; zones or stretches, which are shaded; the published case, whose edges are marked; title;
-    component of the state in the orbit diagram.
+    **Arguments:** sweep; zones or stretches, which are shaded; the published case, whose edges are marked; title.
     """
-    draw: list[Callable[[Axes], Axes]] = []
-    if "strobe" in sweep:
-        draw.append(lambda ax: orbit_diagram(sweep, component, ax))
-    mean = {"mean over initial states": sweep}
-    draw += [lambda ax, name=name: label_speed(_lines(ax, name, mean), sweep) for name in reported(sweep, SWEPT)]
-    if sweep.sizes["exponent"]:
-        draw.append(lambda ax: exponent_strip(sweep, ax))
-    columns = 2 if len(draw) > 3 else 1
-    rows = math.ceil(len(draw) / columns)
-    figure = style.new_figure(9.5 if columns == 1 else 11.5, 1.6 + 2.4 * rows)
-    heights = (2.6, *[1.0] * (rows - 1)) if "strobe" in sweep else [1.0] * rows
-    cells = figure.subplots(rows, columns, sharex=True, squeeze=False, height_ratios=heights)
-    axes = [panel(ax) for panel, ax in zip(draw, cells.ravel(), strict=False)]
-    for ax in cells.ravel()[len(draw) :]:
-        ax.set_axis_off()
-    for ax in axes[:-columns]:
-        ax.set_xlabel("")
-    for ax in axes:
-        if zones is not None:
-            shade_zones(ax, zones)
+    strobe, mean = "strobe" in sweep, {"mean over initial states": sweep}
+    draw: list[Callable[[Axes], Axes]] = [lambda ax: orbit_diagram(sweep, 1, ax)] if strobe else []
+    draw += [partial(_lines, name=name, sweeps=mean) for name in reported(sweep, SWEPT)]
+    draw += [lambda ax: exponent_strip(sweep, ax)] if sweep.sizes["exponent"] else []
+    figure = _over_speed(draw, title, 2.6 if strobe else 1.0)
+    for ax in figure.axes:
+        shade_zones(ax, zones)
         if published is not None:
-            mark_published(ax, published, text=ax is axes[0])
-    style.legend_below(figure, *axes)
-    axes[0].set_title(title, loc="left", fontsize=11, pad=18 if published is not None else 8)
+            mark_published(ax, published, text=ax is figure.axes[0])
+    style.legend_below(figure)
     return add_shaft_axes(figure, sweep)
-
-
-def sweeps_beside(names: Sequence[str], sweeps: Sequence[xr.Dataset], zones: Sequence[Zones] | None = None) -> Figure:
-    """Designs beside each other on one scale: orbit diagrams with exponents beneath, or what whole bearings report.
-
-    **Arguments:** names; sweeps; zones of each sweep, which are shaded.
-    """
-    if any("strobe" not in sweep for sweep in sweeps):
-        return quantities_beside(names, sweeps, [*reported(sweeps[0], COMPARED), "exponent"])
-    figure = style.new_figure(12.0, 6.4)
-    cells = figure.subplots(2, len(sweeps), sharex="col", sharey="row", squeeze=False, height_ratios=(2.0, 1.0))
-    limits = []
-    for column, (name, sweep) in enumerate(zip(names, sweeps, strict=True)):
-        above, below = cells[:, column]
-        orbit_diagram(sweep, 1, above).set(xlabel="")
-        exponent_strip(sweep, below)
-        limits.append((above.get_ylim(), below.get_ylim()))  # axes that share them show the last ones
-        above.set_title(name, loc="left", fontsize=10)
-        for ax in (above, below):
-            if zones is not None:
-                shade_zones(ax, zones[column])
-            if column:
-                ax.set_ylabel("")
-    for row, ends in zip(cells, zip(*limits, strict=True), strict=True):
-        for ax in row:
-            ax.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
-    for ax, sweep in zip(cells[1], sweeps, strict=True):
-        add_shaft_axes(figure, sweep, [ax])
-    style.legend_below(figure, *cells.ravel())
-    return figure
-
-
-def _lines(ax: Axes, name: str, sweeps: dict[str, xr.Dataset]) -> Axes:
-    """A line for each sweep: means of a variable over the initial states, with standard errors."""
-    for (text, sweep), colour in zip(sweeps.items(), cycle(BESIDE_COLOURS), strict=False):
-        label, times = labelled(sweep["exponents" if name == "exponent" else name])
-        mean, error = (times * x for x in mean_over_starts(sweep, name))
-        look: Any = dict(color=colour, linewidth=1.1, marker=".", elinewidth=0.8, label=text)
-        style.dress(ax).errorbar(sweep["rpm"].values, mean, np.nan_to_num(error), **look)
-        ax.set_ylabel(label)
-    return ax
 
 
 def quantities_beside(
@@ -357,17 +248,13 @@ def quantities_beside(
 ) -> Figure:
     """Variables of several sweeps, or ramps, over speed with a line for each; stretches of speed [rpm] in which they
     differ are shaded."""
-    columns = 2 if len(quantities) > 3 else 1
-    rows = math.ceil(len(quantities) / columns)
-    figure = style.new_figure(9.5 if columns == 1 else 11.5, 1.2 + 2.4 * rows)
-    cells, rpm = figure.subplots(rows, columns, sharex=True, squeeze=False), sweeps[0]["rpm"].values
+    lines = dict(zip(names, sweeps, strict=True))
+    figure = _over_speed([partial(_lines, name=name, sweeps=lines) for name in quantities], title)
+    rpm = sweeps[0]["rpm"].values
     half = 0.5 * float(rpm[1] - rpm[0]) if rpm.size > 1 else 0.0
-    for ax, name in zip(cells.ravel(), quantities, strict=False):
-        _lines(ax, name, dict(zip(names, sweeps, strict=True)))
+    for ax in figure.axes:
         for i, (low, high) in enumerate(differ):
             label = "_differs" if i else "differs: hysteresis"
             ax.axvspan(low - half, high + half, color=style.ZONE, linewidth=0, zorder=0, label=label)
-    for ax in cells[-1]:
-        label_speed(ax, sweeps[0])
-    style.legend_below(figure, cells[0, 0])
-    return add_shaft_axes(style.entitled(figure, title), sweeps[0])
+    style.legend_below(figure)
+    return add_shaft_axes(figure, sweeps[0])

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,9 +20,10 @@ from ..orbits import Curve, Point, curve
 from ..quantities import quantity
 from ..solve import AbstractMethod
 from . import style
-from .diagrams import label_speed, labelled, reported
+from .diagrams import label_speed, reported
 from .orbit_figures import chosen_pieces, mark_of
-from .tables import SHOWN, Column, Table, factor, rows_table
+from .quantity_tables import column_of
+from .tables import Column, Table, table
 
 
 SPEED = "speed"
@@ -48,18 +50,13 @@ class Axis:
     """Words for the speed, the first direction."""
 
     @property
-    def head(self) -> str:
-        """Name with the unit in which values are shown."""
-        return Column(self.name, (), self.unit).title
-
-    @property
-    def label(self) -> str:
-        """The same as words of a figure."""
-        return f"{self.head[:1].upper()}{style.readable(self.head[1:])}"
+    def column(self) -> Column:
+        """How its values are shown."""
+        return Column(self.name, unit=self.unit)
 
     def shown(self, values: Any) -> np.ndarray:
         """Values [SI] in the unit in which they are shown."""
-        return np.asarray(values * factor(self.unit, SHOWN.get(self.unit, self.unit)))
+        return np.asarray(values * self.column.scale)
 
 
 def parameter_axis(model: Any, name: str, lower: float | None = None, upper: float | None = None) -> Axis:
@@ -115,10 +112,10 @@ def curves_table(title: str, curves: list[Curve], axis: Axis) -> Table:
         | {**ends("x", c.x_value), **ends("y", c.y_value)}
         for c in curves
     ]
-    columns = [Column("edge", ()), Column("kind", ())]
+    columns: list[Column | str] = ["edge", "kind"]
     for key, name, unit in (("x", SPEED, "rad/s"), ("y", axis.name, axis.unit)):
-        columns += [Column(f"{name} from", (), unit, key=f"{key}_low"), Column("to", (), unit, key=f"{key}_high")]
-    return rows_table(title, rows, [*columns, Column("points", ()), Column("ends", ())], "curves")
+        columns += [Column(f"{name} from", f"{key}_low", unit), Column("to", f"{key}_high", unit)]
+    return table(title, rows, [*columns, "points", "ends"], "curves")
 
 
 def top_exponent(found: xr.Dataset) -> Float[np.ndarray, "x y"]:
@@ -153,7 +150,7 @@ def stability_map(axis: Axis, curves: Sequence[Curve], ax: Axes | None = None, f
         mesh = ax.pcolormesh(x, y, np.ma.masked_invalid(top_exponent(found)).T, **look)
         ax.figure.colorbar(mesh, ax=ax, label=quantity("largest_exponent").label, pad=0.01, extend="both")
         ax.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
-    ax.set_ylabel(axis.label)
+    ax.set_ylabel(axis.column.label)
     return label_speed(ax, axis.speed_text)
 
 
@@ -161,16 +158,11 @@ def _draw_curve(ax: Axes, curve: Curve, x: np.ndarray, y: np.ndarray) -> None:
     """Draw the curve, dotted where its points are neutral saddles and no bifurcations."""
     drawn = {line.get_label() for line in ax.get_lines()}
     genuine = np.asarray(curve.genuine[:-1] & curve.genuine[1:])
+    look: Any = {"color": mark_of(curve.kind).colour, "path_effects": style.halo(3.6), "zorder": 3}
     for label, chosen, width, dash in (("neutral saddles", ~genuine, 1.6, ":"), (curve.kind, genuine, 2.0, "-")):
         if np.any(chosen):
             name = f"_{label}" if label in drawn else label
-            look = {
-                "linestyle": dash,
-                "color": mark_of(curve.kind).colour,
-                "path_effects": style.halo(3.6),
-                "zorder": 3,
-            }
-            ax.plot(*chosen_pieces(x, y, chosen), linewidth=width, **look, label=name)
+            ax.plot(*chosen_pieces(x, y, chosen), linewidth=width, linestyle=dash, **look, label=name)
 
 
 def _cells(found: xr.Dataset, axis: Axis) -> tuple[np.ndarray, np.ndarray]:
@@ -188,30 +180,28 @@ def map_figure(axis: Axis, curves: Sequence[Curve], found: xr.Dataset | None, ti
     **Arguments:** the parameter; curves; a map of labels, or None for the curves alone; title.
     """
     if found is None:
-        figure = style.new_figure(10.0, 6.0)
-        stability_map(axis, curves, figure.subplots())
-        return style.entitled(figure, title)
-    names, (x, y) = reported(found, MAPPED), _cells(found, axis)
-    rows = (len(names) + 3) // 2
-    figure = style.new_figure(11.5, 1.0 + 3.8 * rows)
-    cells = figure.subplots(rows, 2, squeeze=False).ravel()
-    stability_map(axis, curves, cells[0], found).set_title(
-        "Largest exponent", fontsize=10, loc="left", pad=20 if curves else 6
-    )
-    _colour_labels(cells[1], x, y, found["label"].values.astype(str))
-    for ax, name in zip(cells[2:], names, strict=False):
-        label, times = labelled(found[name])
-        z = times * found[name].mean("start", skipna=True).values
-        ratio = np.nanmin(z) > 0 and np.nanmax(z) > 20 * np.nanmin(z)
-        drawn = style.dress(ax).pcolormesh(x, y, z.T, cmap="viridis", norm=LogNorm() if ratio else None)
-        figure.colorbar(drawn, ax=ax)
-        ax.set_title(label, fontsize=10, loc="left")
-    for ax in cells[1 : 2 + len(names)]:
-        ax.set_ylabel(axis.label)
+        return style.panels([lambda ax: stability_map(axis, curves, ax)], 1, (10.0, 6.0), title)
+    borders = _cells(found, axis)
+
+    def exponents(ax: Axes) -> None:
+        stability_map(axis, curves, ax, found)
+        ax.set_title("Largest exponent", fontsize=10, loc="left", pad=20 if curves else 6)
+
+    def means(ax: Axes, name: str) -> None:
+        column, z = column_of(found, name), found[name].mean("start", skipna=True).values
+        wide = np.nanmin(z) > 0 and np.nanmax(z) > 20 * np.nanmin(z)
+        drawn = ax.pcolormesh(*borders, column.scale * z.T, cmap="viridis", norm=LogNorm() if wide else None)
+        ax.figure.colorbar(drawn, ax=ax)
+        ax.set_title(column.label, fontsize=10, loc="left")
+
+    names = reported(found, MAPPED)
+    draw = [exponents, lambda ax: _colour_labels(ax, *borders, found["label"].values.astype(str))]
+    draw += [partial(means, name=name) for name in names]
+    figure = style.panels(draw, 2, (11.5, 1.0 + 3.8 * ((len(draw) + 1) // 2)), title)
+    for ax in figure.axes[1 : len(draw)]:
+        ax.set_ylabel(axis.column.label)
         label_speed(ax, axis.speed_text).grid(False)
-    for ax in cells[2 + len(names) :]:
-        ax.set_axis_off()
-    return style.entitled(figure, title)
+    return figure
 
 
 def _colour_labels(ax: Axes, x: np.ndarray, y: np.ndarray, labels: np.ndarray) -> None:
@@ -220,9 +210,8 @@ def _colour_labels(ax: Axes, x: np.ndarray, y: np.ndarray, labels: np.ndarray) -
     known = {**style.KIND_COLOURS, **style.MOTION_COLOURS}
     pale: Any = lambda colour: tuple(0.45 + 0.55 * part for part in to_rgb(colour))
     colour = lambda lanes: pale(known.get(lanes[0], style.GREY) if len(set(lanes)) == 1 else style.GREY)
-    style.dress(ax).pcolormesh(
-        x, y, np.array([[colour(lanes.tolist()) for lanes in row] for row in kinds.swapaxes(0, 1)])
-    )
+    image = np.array([[colour(lanes.tolist()) for lanes in row] for row in kinds.swapaxes(0, 1)])
+    ax.pcolormesh(x, y, image)
     ax.set_title("Label (grey: the start decides, or failed)", fontsize=10, loc="left")
     met = [name for name in known if np.any(kinds == name)]
     patches: list[Any] = [Patch(color=pale(known[name]), label=name.replace("_", " ")) for name in met]

@@ -1,8 +1,7 @@
 """Branches of periodic orbits over speed, where they bifurcate, and Floquet multipliers in the complex plane."""
 
-import dataclasses
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -12,13 +11,12 @@ from matplotlib.patches import Circle
 
 from .._errors import ArgumentError
 from ..orbits import Branch, Point
-from ..quantities import component_names, quantity
+from ..quantities import quantity
 from . import style
 from .diagrams import label_speed, orbit_diagram
 
 
-@dataclasses.dataclass(frozen=True)
-class Mark:
+class Mark(NamedTuple):
     """Marker, colour and abbreviation of a kind of bifurcation."""
 
     marker: str
@@ -34,6 +32,8 @@ MARKS = {
 }
 """Marks of bifurcations in every figure."""
 PERIOD_COLOURS = {1: style.BLUE, 2: style.ORANGE, 3: style.PURPLE, 4: style.SKY}
+SHOWN = quantity("y_C")
+"""Component of the state that is drawn, the second one."""
 LABEL_SIZE = 7.5
 REACH = 1.6
 """Largest real and imaginary part of the multipliers that are shown."""
@@ -49,12 +49,10 @@ def words(kind: str) -> str:
     return f"{kind.replace('branch-p', 'branch p')} ({mark_of(kind).short})" if kind in MARKS else kind
 
 
-def branch_diagram(branches: Sequence[Branch], component: int = 1, ax: Axes | None = None) -> Axes:
-    """Strobe value of periodic orbits over speed: stable parts thick, unstable parts thin and light, one colour for
-    each number of periods. Bifurcations that bound a stable part are filled markers with their speed above the frame,
-    others are small and hollow.
-
-    **Arguments:** branches over speed; component of the state (1: vertical displacement); axes.
+def branch_diagram(branches: Sequence[Branch], ax: Axes | None = None) -> Axes:
+    """Vertical displacement of periodic orbits over speed: stable parts thick, unstable parts thin and light, one
+    colour for each number of periods. Bifurcations that bound a stable part are filled markers with their speed above
+    the frame, others are small and hollow.
 
     **Raises:** `ValueError` if a branch is not over speed, or there is none.
     """
@@ -62,53 +60,46 @@ def branch_diagram(branches: Sequence[Branch], component: int = 1, ax: Axes | No
         given = ", ".join(b.parameter for b in branches) or "no branch"
         raise ArgumentError("branches", said=f"must hold branches over speed, but {given} was given.")
     ax = style.axes_or_new(ax, 9.0, 5.0)
-    named = quantity(component_names(branches[0].state.shape[-1])[component])
-    paths = [(b.periods, *polyline(b, component)) for b in branches]
+    paths = [(b.periods, *polyline(b)) for b in branches]
     for periods in sorted({path[0] for path in paths}):
         _draw_paths(ax, periods, [path[1:] for path in paths if path[0] == periods])
     speeds, values = (np.concatenate([path[i] for path in paths]) for i in (1, 2))
-    ax.set(xlim=(speeds.min(), speeds.max()), ylim=style.padded_limits(values), ylabel=named.label)
+    ax.set(xlim=(speeds.min(), speeds.max()), ylim=style.padded_limits(values), ylabel=SHOWN.label)
     special = [p for b in branches for p in b.special]
-    _mark_points(ax, special, lambda p: [(float(p.speed_rpm), float(p.state[component]) * named.factor)])
+    _mark_points(ax, special, lambda p: [(float(p.speed_rpm), float(p.state[1]) * SHOWN.factor)])
     if any(not p.edge for p in special):
         look: dict[str, Any] = {"color": style.GREY, "markersize": 4.5, "markerfacecolor": "white"}
         ax.plot([], [], "o", **look, label="hollow: unstable on both sides")
     _write_above(ax, [p for p in special if p.edge])
-    below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 4}
-    style.enlarge_dots(ax.legend(**below, frameon=False, fontsize=8.5, handlelength=2.0, columnspacing=1.6))
+    style.legend_beside(ax)
     return label_speed(ax)
 
 
-def orbit_diagram_with_branches(
-    sweep: xr.Dataset, branches: Sequence[Branch], component: int = 1, ax: Axes | None = None
-) -> Axes:
+def orbit_diagram_with_branches(sweep: xr.Dataset, branches: Sequence[Branch], ax: Axes | None = None) -> Axes:
     """Branches of periodic orbits over the orbit diagram, whose points are grey."""
-    ax = orbit_diagram(sweep, component, style.axes_or_new(ax, 9.0, 5.0))
+    ax = orbit_diagram(sweep, 1, style.axes_or_new(ax, 9.0, 5.0))
     clouds = [line for line in ax.get_lines() if line.get_label() in style.KIND_COLOURS]
     for i, line in enumerate(clouds):
         label = "simulated" if i == 0 else "_simulated"
         line.set(color=style.GREY, alpha=0.5, markersize=1.4 * line.get_markersize(), zorder=1, label=label)
     limits = np.array([ax.get_xlim(), ax.get_ylim()])
-    branch_diagram(branches, component, ax)
+    branch_diagram(branches, ax)
     both = np.array([limits, [ax.get_xlim(), ax.get_ylim()]])
     (left, right), (low, high) = np.transpose([both[..., 0].min(axis=0), both[..., 1].max(axis=0)])
     ax.set(xlim=(left, right), ylim=(low, high))
     return ax
 
 
-def polyline(
-    branch: Branch, component: int
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], Bool[np.ndarray, " n-1"]]:
-    """Speeds [rpm] and shown values of a component, special points included, and True for each stable piece between
+def polyline(branch: Branch) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], Bool[np.ndarray, " n-1"]]:
+    """Speeds [rpm] and shown vertical displacements, special points included, and True for each stable piece between
     two points."""
-    times = quantity(component_names(branch.state.shape[-1])[component]).factor
-    x, y, stable = branch.speed_rpm, branch.state[:, component] * times, branch.stable
+    x, y, stable = branch.speed_rpm, branch.state[:, 1] * SHOWN.factor, branch.stable
     pieces = stable[:-1] & stable[1:]
     done = branch.value.size
     for p in sorted(branch.special, key=lambda p: (p.index, _share(branch, p)), reverse=True):
         k = p.index
         beyond = stable[k] and stable[k + 1] if k == done else stable[k + 1]
-        x, y = np.insert(x, k + 1, p.speed_rpm), np.insert(y, k + 1, p.state[component] * times)
+        x, y = np.insert(x, k + 1, p.speed_rpm), np.insert(y, k + 1, p.state[1] * SHOWN.factor)
         pieces = np.concatenate([pieces[:k], [stable[k], beyond], pieces[k + 1 :]])
         done = k
     return x, y, pieces
@@ -128,7 +119,7 @@ def _draw_paths(ax: Axes, periods: int, paths: Sequence[tuple[np.ndarray, np.nda
     thick = {"color": colour, "linewidth": 2.4, "solid_capstyle": "butt", "zorder": 3.0}
     for word, look in (("stable", thick), ("unstable", thin)):
         parts = [chosen_pieces(x, y, pieces if word == "stable" else ~pieces) for x, y, pieces in paths]
-        x, y = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
+        x, y = np.concatenate(parts, axis=1)
         if x.size:
             ax.plot(x, y, **look, label=f"period-{periods}, {word}")
 

@@ -1,4 +1,4 @@
-"""The report as one page of HTML that needs nothing from outside, made of sections; what was not found is left out."""
+"""The report as one page of HTML that needs nothing from outside: answers of commands, one section for each."""
 
 import base64
 import dataclasses
@@ -9,55 +9,21 @@ import os
 import platform
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import jinja2
 import matplotlib
-import numpy as np
+import xarray as xr
 from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 
 from .. import __version__
-from .._parameters import parameter_info, parameters, readings_of
-from ..analysis import Zones, failed, length, measures, resolution_rpm, restless
-from ..bearing import design_rule_violations
-from ..design import Ensemble
-from .chance_tables import chances_answer, chances_notes, chances_tables, operating_chances
-from .design_figures import chance_of_chaos, elasticity_bars, statistic_bars
-from .diagrams import SWEPT, add_shaft_axes, mark_operating, reported, sweep_figure, zone_strip
-from .findings import (
-    CLOSE,
-    Findings,
-    OneSpeed,
-    Operating,
-    Orbits,
-    Verdict,
-    chaotic_verdict,
-    loss_verdict,
-    motion_verdict,
-)
-from .gradient_tables import elasticities_table, mean_gradient_tables, residual_words, to_be_turned
-from .maps import stability_map
-from .orbit_figures import multiplier_circle, orbit_diagram_with_branches
-from .quantity_tables import quantities_table, run_tables, statics_table
-from .run_figures import load_bars, rollers_of, run_figure
-from .sources import readings_words, shown, sources_table
-from .style import drawn
-from .tables import Beside, Column, Table, counted, rows_table
-from .zone_tables import (
-    coexisting_notes,
-    edge_table,
-    loss_table,
-    stretches_table,
-    transient_tables,
-    zone_span,
-    zones_table,
-)
+from .diagrams import CAGE, SHAFT, add_shaft_axes, mark_operating
+from .operating import Operating
+from .tables import Table, table
 
 
 RASTER_DPI = 150
 """Resolution of clouds of points, which would weigh megabytes as points."""
-KEY_PARAMETERS = ("guidance_gap", "eccentricity", "cage_mass")
 PAPER = (
     "Equations: L. Chen, X. Xia, H. Zheng, M. Qiu, Chaotic Dynamics of Cage Behavior in a High-Speed Cylindrical "
     "Roller Bearing, Shock and Vibration 2016, article 9120505, with its misprints corrected."
@@ -68,51 +34,50 @@ PAPER = (
 class Section:
     """A part of the page."""
 
-    key: str
     title: str
     sentences: Sequence[str] = ()
     figures: Mapping[str, tuple[Figure, str]] = dataclasses.field(default_factory=dict)
     """Figures by name, each with its caption."""
     tables: Sequence[Table] = ()
     notes: Sequence[str] = ()
-    key_figures: Sequence[tuple[str, str]] = ()
+
+    @property
+    def key(self) -> str:
+        """Address of the section within the page."""
+        return self.title.lower().replace(" ", "-")
 
 
 def page(
-    findings: Findings,
+    title: str,
+    subtitle: str,
+    sections: Sequence[Section],
     *,
-    table: Mapping[str, Any] | None = None,
+    sweep: xr.Dataset,
+    operating: Sequence[Operating] = (),
     command: str = "",
-    chances: Ensemble | None = None,
-    left: Sequence[str] = (),
 ) -> str:
     """The report as HTML.
 
-    **Arguments:** findings; the nested mapping that the design was read from (None: a published case); the command line
-    that asked for the page; the results of draws from its ranges (None: all values are known); values that are still
-    those of the template, by dotted name.
+    **Arguments:** title and subtitle; sections, whose figures get axes of the shaft speed and marks of the operating
+    speeds; the sweep that has both speeds; operating speeds; the command line that asked for the page.
     """
-    model, rpm = findings.model, findings.sweep["rpm"].values
-    own = model.speed_text.split()[0]
-    what = f"Case {findings.name}" if findings.published is not None else findings.name
-    about = "where the cage moves chaotically" if findings.orbits is not None else "slip, forces and wear"
-    quick = ", quick report: no gradients, a coarser sweep" if findings.quick else ""
+    spans = [(at.low_rpm, at.high_rpm) for at in operating]
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
     )
-    return environment.get_template("page.html.j2").render(
-        title=f"{what}: {about}",
-        subtitle=f"Cylindrical roller bearing, {rpm[0]:.0f} to {rpm[-1]:.0f} rpm of the {own}{quick}",
-        sections=_sections(findings, table, chances, left),
-        picture=lambda figure: _picture(add_shaft_axes(figure, findings.sweep)),
-        words=lambda table: [all(v is None or isinstance(v, str) for v in c.values) for c in table.columns],
-        version=__version__,
-        command=command,
-        date=datetime.date.today().isoformat(),
-    )
+
+    def picture(figure: Figure) -> tuple[str, int, int]:
+        for ax in figure.axes:
+            if any(each.get_xlabel() in (CAGE, SHAFT) for each in ax.get_shared_x_axes().get_siblings(ax)):
+                mark_operating(ax, spans)
+        return _picture(add_shaft_axes(figure, sweep))
+
+    made = {"version": __version__, "command": command, "date": datetime.date.today().isoformat()}
+    template = environment.get_template("page.html.j2")
+    return template.render(title=title, subtitle=subtitle, sections=sections, picture=picture, **made)
 
 
 def _picture(figure: Figure) -> tuple[str, int, int]:
@@ -126,310 +91,15 @@ def _picture(figure: Figure) -> tuple[str, int, int]:
     return "data:image/svg+xml;base64," + base64.b64encode(box.getvalue()).decode("ascii"), width, height
 
 
-def _sections(
-    findings: Findings, table: Mapping[str, Any] | None, chances: Ensemble | None, left: Sequence[str]
-) -> list[Section]:
-    orbits, one, statics = findings.orbits, findings.one_speed, findings.statics
-    sections = [_result(findings, chances, left)]
-    if findings.operating:
-        sections.append(Section("operating", "Operating speeds", tables=[verdict_table(findings)]))
-    sections += [_known(findings, chances)] if chances is not None else []
-    sections += [_motion(findings)] if orbits is None else [_zones(findings, orbits), _synchronous(findings, orbits)]
-    sections += [] if orbits is None else [_map(findings, orbits)]
-    sections += [_gradients(findings, orbits)] if orbits is not None and orbits.slopes else []
-    sections += _one_speed(findings, one) if one is not None else []
-    if statics is not None:
-        said = f"under {float(findings.model.load):g} N"
-        figure = drawn(lambda ax: load_bars(statics, ax), 7.0, 3.2), f"Load of every roller at rest {said}."
-        rows = statics_table(f"At rest {said}", findings.model, statics)
-        sections.append(Section("statics", "Statics", (), {"statics": figure}, [rows]))
-    model = findings.model
-    doubts = [*design_rule_violations(model.bearing, model.guidance_gap), *model.lubricant.doubts()]
-    warnings = [f"Warning: {doubt}" for doubt in doubts]
-    return [
-        *sections,
-        Section("design", "The design", warnings, tables=[sources_table(model, table, left)]),
-        Section("checks", "How sure this is", tables=[_checks(findings)]),
-        Section("computed", "How it was computed", tables=[_settings(findings)], notes=[PAPER]),
-    ]
-
-
-def _beside(findings: Findings) -> Beside:
-    """The shaft speed, if the model's is that of the cage, and its ratio to it."""
-    found = findings.sweep
-    return ("shaft", float(found["shaft_rpm"][-1] / found["rpm"][-1])) if "shaft_rpm" in found.coords else None
-
-
-def _both(findings: Findings, at: Operating) -> str:
-    other = _beside(findings)
-    return str(at) if other is None else f"{at} (shaft {at.of_shaft(1 / other[1])})"
-
-
-def assess(findings: Findings) -> list[tuple[Operating, dict[str, Verdict]]]:
-    """Each operating speed with the verdicts on it by kind of zone."""
-    return [(at, _verdicts(findings, at)) for at in findings.operating]
-
-
-def _verdicts(findings: Findings, at: Operating) -> dict[str, Verdict]:
-    orbits, found = findings.orbits, findings.zones
-    if orbits is None or not isinstance(found, Zones):
-        assert not isinstance(found, Zones)
-        return {"motion": motion_verdict(at, found, findings.sweep)}
-    searched = orbits.found.lower_rpm, orbits.found.upper_rpm
-    return {
-        "synchronous-loss": loss_verdict(at, orbits.loss.zones, *searched, bool(orbits.found.stretches)),
-        "chaotic": chaotic_verdict(at, found, findings.sweep),
-    }
-
-
-def verdict_table(findings: Findings) -> Table:
-    """Operating speeds with the verdicts on them."""
-    rows = [
-        vars(v) | {"speed": _both(findings, at), "kind": kind, "verdict": v.state}
-        for at, verdicts in assess(findings)
-        for kind, v in verdicts.items()
-    ]
-    columns = [
-        *(Column(head, ()) for head in ("speed", "kind", "verdict", "where")),
-        Column("nearest edge", (), key="edge"),
-        Column("away [rpm]", (), key="distance_rpm", digits=0),
-        Column("away [%]", (), key="percent", digits=1),
-    ]
-    close = f"close: an edge within {100 * CLOSE:g} % of the speed or within its own uncertainty"
-    return rows_table(f"Operating speeds of {findings.name} beside its zones ({close})", rows, columns)
-
-
-def calmest(findings: Findings) -> tuple[float, float] | None:
-    """The widest range of the sweep [rpm] outside all zones, transient chaos included; None if there is none."""
-    found, orbits = findings.zones, findings.orbits
-    if orbits is None or not isinstance(found, Zones):
-        return None
-    first, last = (float(findings.sweep["rpm"][i]) for i in (0, -1))
-    taken = sorted(zone_span(z, first, last) for z in (*orbits.loss.zones, *found.zones, *found.transient))
-    free, at = [], first
-    for low, high in taken:
-        free.append((at, low))
-        at = max(at, high)
-    low, high = max([*free, (at, last)], key=lambda pair: pair[1] - pair[0])
-    return (low, high) if high > low else None
-
-
-def _result(findings: Findings, chances: Ensemble | None, left: Sequence[str]) -> Section:
-    sweep, found, orbits = findings.sweep, findings.zones, findings.orbits
-    lost, said, figures = failed(sweep), [], {}
-    if orbits is not None and isinstance(found, Zones):
-        said.append(
-            f"{counted(len(found.zones), 'chaotic zone')} and {counted(len(orbits.loss.zones), 'zone')} without a "
-            f"stable synchronous orbit. At {np.mean(restless(sweep)):.0%} of {counted(sweep.sizes['speed'], 'speed')} "
-            f"some initial state of {sweep.sizes['start']} leads to chaos, for a while at least."
-        )
-        if (calm := calmest(findings)) is not None:
-            said.append(f"The widest range outside all zones goes from {calm[0]:.0f} to {calm[1]:.0f} rpm.")
-        spans = [(at.low_rpm, at.high_rpm) for at in findings.operating]
-        limits = float(sweep["rpm"][0]), float(sweep["rpm"][-1])
-        draw = lambda ax: zone_strip(orbits.loss.zones, found.zones, limits, spans, findings.published, ax)
-        strip = drawn(draw, 9.5, 1.9 if spans else 1.5)
-        figures["strip"] = strip, "Zones of both kinds over speed, with any operating speeds."
-    else:
-        chaotic = sum(each.speeds for each in found if each.chaotic)  # pyright: ignore
-        speeds = counted(sweep.sizes["speed"], "speed")
-        said.append(f"The largest exponent is positive beyond doubt at {chaotic} of {speeds}.")
-    for at, verdicts in assess(findings):
-        each = (f"{v.where} ({kind})" if kind == "motion" else _words(kind, v.state) for kind, v in verdicts.items())
-        said.append(f"{_both(findings, at)}: {', '.join(each)}.")
-    if readings_of(findings.model):
-        said.append(f"All of this rests on two readings: {readings_words(findings.model)}.")
-    if np.any(lost):
-        said.append(f"{int(np.sum(lost))} of {counted(lost.size, 'simulation')} failed: nothing is known of them.")
-    if chances is not None:
-        said.append(
-            f"All zones of this page are those of the best guesses: {counted(len(chances.unknowns), 'value')} known "
-            f"within ranges only. {chances_answer(chances)}"
-        )
-    if left:
-        said.append(f"Values that are still the template's, another bearing's: {', '.join(left)}.")
-    return Section("result", "In short", said, figures, key_figures=_key_figures(findings.model))
-
-
-def _words(kind: str, state: str) -> str:
-    said = {"close": "close to", "clear": "clear of", "unknown": "not known for"}.get(state, state)
-    return said if said.endswith("chaos") else f"{said} {kind} zones"
-
-
-def _key_figures(model: Any) -> list[tuple[str, str]]:
-    value, info, named = parameters(model), parameter_info(model), []
-    for name in (name for name in KEY_PARAMETERS if name in value):
-        unit, number = shown(float(value[name]), info[name].unit)
-        named.append((name.replace("_", " "), f"{number:.4g} {unit}"))
-    oil = 1e3 * float(model.lubricant.dynamic_viscosity)
-    rollers = f"{model.bearing.n_rollers} of {1e3 * float(model.bearing.roller_diameter):.4g} mm"
-    return [*named, ("viscosity of the oil", f"{oil:.3g} mPa s"), ("rollers", rollers)]
-
-
-def _known(findings: Findings, chances: Ensemble) -> Section:
-    """Chances of chaos over draws from the ranges of a design."""
-    other = _beside(findings)
-    tables = chances_tables(findings.name, chances, other)
-    if findings.operating and other is not None:
-        tables = [operating_chances(chances, findings.operating, 1 / other[1]), *tables]
-    figure = drawn(lambda ax: chance_of_chaos(chances.rpm, chances.chance, chances.interval, ax), 9.5, 4.6)
-    caption = f"Share of {chances.place.shape[0]} draws from the ranges that are chaotic, with 95 % bars."
-    figures, notes = {"chance": (_marked(figure, findings), caption)}, chances_notes(chances)
-    return Section("known", "What is known, and what it decides", notes, figures, tables)
-
-
-def _motion(findings: Findings) -> Section:
-    """Stretches of speed with one motion of the cage."""
-    sweep, found = findings.sweep, findings.zones
-    assert not isinstance(found, Zones)
-    said = "A zone is a stretch of speeds with one motion of the cage. Bars are standard errors."
-    caption = "Quantities that the model reports over speed, means over initial states; zones are shaded."
-    tables = [stretches_table(findings.name, found)]
-    tables.append(quantities_table("Means over initial states", sweep, reported(sweep, SWEPT)))
-    figure = _marked(sweep_figure(sweep, found, findings.published), findings)
-    return Section("zones", "Over speed", [said], {"sweep": (figure, caption)}, tables)
-
-
-def _zones(findings: Findings, orbits: Orbits) -> Section:
-    """Chaotic zones, and zones without a stable synchronous orbit."""
-    sweep, found, other, name = findings.sweep, findings.zones, _beside(findings), findings.name
-    assert isinstance(found, Zones)
-    said = (
-        "Two kinds of zone are never mixed. In a synchronous-loss zone the orbit that turns with the cage is not "
-        "stable; its edges are bifurcations, solved for. In a chaotic zone some initial state leads to chaos; its "
-        f"edges are seen in a sweep and no sharper than its grid ({resolution_rpm(sweep):.0f} rpm), unless they "
-        "coincide with a bifurcation."
-    )
-    caption = (
-        "Vertical displacement once a revolution, over cage speed, from all initial states; beneath it the largest "
-        "exponent. Chaotic zones are shaded."
-    )
-    tables = [
-        loss_table(name, orbits.found, orbits.loss, findings.published, other),
-        zones_table(name, found, findings.published, (float(sweep["rpm"][0]), float(sweep["rpm"][-1])), other),
-        *transient_tables(name, found),
-    ]
-    figure = _marked(sweep_figure(sweep, found, findings.published), findings)
-    return Section("zones", "Zones", [said], {"orbits": (figure, caption)}, tables, coexisting_notes(orbits.loss))
-
-
-def _synchronous(findings: Findings, orbits: Orbits) -> Section:
-    found, figures, notes = orbits.found, {}, []
-    if found.branches:
-        draw = lambda ax: orbit_diagram_with_branches(findings.sweep, found.branches, 1, ax)
-        caption = "Orbits that turn with the cage, stable (thick) and unstable (thin), over the simulations (grey)."
-        figures["branches"] = drawn(draw, 9.5, 5.4), caption
-        principal = orbits.loss.principal
-        branch = found.branches[0 if principal is None else principal.branch]
-        caption = (
-            "Floquet multipliers along the branch on which most simulations settled. The orbit is stable while all are "
-            "inside the unit circle; how one leaves it tells what follows."
-        )
-        figures["multipliers"] = drawn(lambda ax: multiplier_circle(branch, ax), 7.0, 5.8), caption
-    if further := len(found.edges) - len({id(p) for p in orbits.loss.edges.values()}):
-        notes.append(f"{further} further ends of stable stretches bound no zone (jaxcage bifurcations lists them).")
-    tables = [edge_table(found, orbits.loss, _beside(findings), named=True)]
-    return Section("stability", "The synchronous orbit", (), figures, tables, notes)
-
-
-def _map(findings: Findings, orbits: Orbits) -> Section:
-    axis = orbits.axis
-    figure = drawn(lambda ax: stability_map(axis, orbits.curves, ax, orbits.map), 9.5, 5.0)
-    own = float(axis.shown(float(parameters(findings.model)[axis.name])))
-    figure.axes[0].axhline(own, color="#000000", linewidth=1.0, linestyle=":")
-    curves = " The lines are its edges, solved for." if orbits.curves else ""
-    caption = (
-        f"Largest exponent per revolution over speed and guidance gap (red: chaotic). Dotted: this design.{curves}"
-    )
-    notes = [f"Not followed: {name} ({why})." for name, why in orbits.refused.items()]
-    return Section("map", "Stability map", (), {"map": (_marked(figure, findings), caption)}, notes=notes)
-
-
-def _gradients(findings: Findings, orbits: Orbits) -> Section:
-    edges = [s for name, s in orbits.slopes.items() if s.trusted and name in orbits.loss.edges]
-    trusted, figures = to_be_turned(findings.model, edges), {}
-    if trusted:
-        caption = (
-            "Change of the synchronous-loss edges: per cent of speed for one per cent of a parameter that a designer "
-            "can choose."
-        )
-        bars = drawn(lambda ax: elasticity_bars(trusted, ax), 9.5, 2.2 + 0.95 * len(trusted))
-        figures["elasticities"] = bars, caption
-    said = (
-        "Exact derivatives of the edges with respect to every parameter. An elasticity of 0.10 means that one per cent "
-        "more of the parameter moves the edge up by a tenth of a per cent."
-    )
-    tables = [elasticities_table(findings.name, orbits.slopes, _beside(findings))]
-    return Section("gradients", "What moves the edges", [said], figures, tables)
-
-
-def _one_speed(findings: Findings, one: OneSpeed) -> list[Section]:
-    """A run at the first operating speed, and slopes of means there."""
-    rollers, title = rollers_of(findings.model, one.run), f"At {one.at}"
-    caption = "The bearing at its largest pocket force, the path of its cage, slips and forces around it, spectra."
-    figures = {"run": (run_figure(findings.model, one.run, rollers), caption)}
-    tables = run_tables(title, measures(findings.model, one.run), rollers)
-    found = [Section("run", title, (), figures, tables)]
-    if one.slopes is not None:
-        caption = "Per cent of a mean for one per cent of a parameter, with two standard errors."
-        figures = {"slopes": (statistic_bars(one.slopes), caption)}
-        tables = mean_gradient_tables(f"at {one.at}", one.slopes)
-        found.append(Section("slopes", "What moves the means", (), figures, tables))
-    return found
-
-
-def _marked(figure: Figure, findings: Findings) -> Figure:
-    """The figure with the operating speeds on every axis of speed."""
-    for ax in figure.axes:
-        if ax.get_label() != "<colorbar>":
-            mark_operating(ax, [(at.low_rpm, at.high_rpm) for at in findings.operating])
-    return figure
-
-
-def _pairs(title: str, heads: tuple[str, str], rows: Mapping[str, str]) -> Table:
-    return Table(title, [Column(heads[0], list(rows)), Column(heads[1], list(rows.values()))])
-
-
-def _checks(findings: Findings) -> Table:
-    """Checks of the numbers of a report."""
-    sweep, orbits, zones, lost = findings.sweep, findings.orbits, findings.zones, failed(findings.sweep)
-    changed = ", then ".join(f"{changed} of {lanes}" for lanes, changed, _ in json.loads(sweep.attrs["confirmed"]))
-    rows = {
-        "simulations that failed": f"{int(np.sum(lost))} of {lost.size}",
-        "labels that changed when confirmed by finer steps": changed or "none confirmed",
-        "largest error of a revolution, of the scale": f"{np.max(sweep['error'].values[~lost], initial=0.0):.0e}",
-        "simulations beyond eps = 1, where surfaces would overlap": str(int(np.sum(sweep["peak"].values > 1))),
-        "simulations whose label is undecided": str(int(np.sum(sweep["label"].values == "undecided"))),
-    }
-    if orbits is not None and isinstance(zones, Zones):
-        edges = [e for zone in zones.zones for e in (zone.onset, zone.exit) if e is not None]
-        exact = f"{sum(e.basis != 'statistical' for e in edges)} of {len(edges)}"
-        rows["settled synchronous orbits that lie on no branch that was followed"] = str(orbits.found.missed)
-        rows["chaotic edges that coincide with something solved for"] = "not tried" if findings.quick else exact
-        if orbits.slopes:
-            untrusted = [f"{n} ({s.status})" for n, s in orbits.slopes.items() if not s.trusted]
-            rows["gradients against the scaling of units, largest relative residual"] = residual_words(orbits.slopes)
-            rows["edges whose gradient is not to be trusted"] = ", ".join(untrusted) or "none"
-    return _pairs("Checks of this report", ("check", "result"), rows)
-
-
-def _settings(findings: Findings) -> Table:
+def settings_table(sweep: xr.Dataset, seconds: float) -> Table:
     """Versions, machine and settings that a report was made with."""
-    sweep, settings = findings.sweep, json.loads(findings.sweep.attrs["settings"])
+    settings = json.loads(sweep.attrs["settings"])
     versions = [f"{k.removeprefix('version_')} {v}" for k, v in settings.items() if k.startswith("version_")]
-    rpm, zones = sweep["rpm"].values, findings.zones
-    closed = f"; windows below {zones.close_below_rpm:g} rpm closed" if isinstance(zones, Zones) else ""
-    span = f"from {rpm[0]:.0f} to {rpm[-1]:.0f} rpm"
     rows = {
         "versions": ", ".join([*versions, f"Python {platform.python_version()}"]),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
-        "readings": readings_words(findings.model),
-        "sweep": f"{counted(rpm.size, 'speed')} {span}, {counted(sweep.sizes['start'], 'initial state')}",
-        "length": length(sweep),
-        "resolution": f"{resolution_rpm(sweep):.0f} rpm{closed}",
         "steps of the sweep": " ".join(str(settings.get("method", "")).split()),
-        "steps of orbits": "" if findings.orbits is None else findings.orbits.method,
         "random numbers": "none: the initial states are fixed",
-        "time": ", ".join(f"{stage} {s:.0f} s" for stage, s in findings.seconds.items()),
+        "time": f"{seconds:.0f} s",
     }
-    return _pairs("Settings", ("what", "value"), {name: words for name, words in rows.items() if words})
+    return table("Settings", [{"what": what, "value": said} for what, said in rows.items() if said], ["what", "value"])

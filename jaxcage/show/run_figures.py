@@ -12,14 +12,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Annulus, Circle, Polygon
 
-from ..analysis import (
-    Around,
-    OrderSpectrum,
-    RollerHistory,
-    around,
-    bearing_spectra,
-    cage_forces,
-)
+from ..analysis import Around, OrderSpectrum, RollerHistory, around, bearing_spectra, cage_forces
 from ..bearing import LoadDistribution
 from ..quantities import component_names, quantity
 from ..solve import Trajectory
@@ -32,11 +25,12 @@ MM = 1e3
 LONGEST_ARROW = 0.14
 """Length of the arrow of the largest pocket force of a run, relative to the outside diameter."""
 SPECTRA = {"cage_place": "Cage, vertical / clearance", "pocket_force": "Pockets, vertical [N]"}
+"""Words for the quantities that have a spectrum."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Rollers:
-    """What a run of a bearing says of its rollers."""
+    """Rollers of a bearing during a run."""
 
     history: RollerHistory
     around: Around
@@ -78,29 +72,28 @@ def _over_time(
     time = trajectory.time * quantity("time").factor
     for label, (values, colour, dash) in lines.items():
         ax.plot(time, values, color=colour, linestyle=dash, linewidth=0.9, label=label)
-    ends = (float(time[0]), float(time[-1]) if time.size > 1 else float(time[0]) + 1.0)
-    ax.set(xlabel=quantity("time").label, ylabel=ylabel, xlim=ends)
+    ax.margins(x=0)
+    ax.set(xlabel=quantity("time").label, ylabel=ylabel)
     style.legend_beside(ax)
     return ax
 
 
-def orbit(trajectory: Trajectory, clearance: Float[np.ndarray, ""] | float, ax: Axes | None = None) -> Axes:
+def orbit(trajectory: Trajectory, clearance: float, ax: Axes | None = None) -> Axes:
     """Path of the cage centre relative to the rib in the clearance circle, with a dot at each revolution.
 
     **Arguments:** trajectory; radial clearance [m]; axes.
     """
     ax = style.axes_or_new(ax, 5.0, 5.0)
     path = trajectory.state[:, :2]
-    if trajectory.state.shape[1] == 8:
+    if trajectory.state.shape[1] == 8:  # an elastic rib
         path = path - trajectory.state[:, 2:4]
     times = quantity("x_C").factor
-    path_in_circle(ax, times * path, times * float(clearance), trajectory.samples)
+    _path_in_circle(ax, times * path, times * clearance, trajectory.samples)
     ax.set(xlabel=quantity("x_C").label, ylabel=quantity("y_C").label)
     return ax
 
 
-def path_in_circle(ax: Axes, path: Float[np.ndarray, "n 2"], radius: float, samples: int) -> None:
-    """A path in the clearance circle, with a dot at each revolution of so many samples."""
+def _path_in_circle(ax: Axes, path: Float[np.ndarray, "n 2"], radius: float, samples: int) -> None:
     ax.add_patch(Circle((0, 0), radius, fill=False, color=style.GREY, linewidth=1.0, linestyle="--"))
     ax.plot(*path.T, color=style.BLUE, linewidth=0.7, alpha=0.8)
     ax.plot(*path[::samples].T, ".", color=style.BLACK, markersize=4)
@@ -108,18 +101,18 @@ def path_in_circle(ax: Axes, path: Float[np.ndarray, "n 2"], radius: float, samp
     ax.set(xlim=limits, ylim=limits, aspect="equal")
 
 
-def simulation_figure(
-    trajectory: Trajectory, forces: Forces, clearance: Float[np.ndarray, ""] | float, title: str = ""
-) -> Figure:
-    """Path, time history and each force of a trajectory."""
-    figure = style.new_figure(11.5, 6.4)
+def run_figure(model: Any, run: Trajectory, rollers: Rollers | None, title: str = "") -> Figure:
+    """One run of a cage, its path, time history and each force; or of a bearing with its rollers."""
+    if rollers is not None:
+        return _bearing_figure(model, run, rollers, title)
+    forces, figure = cage_forces(model, run), style.new_figure(11.5, 6.4)
     grid = figure.add_gridspec(3, 2, width_ratios=(1, 1.7))
     history = figure.add_subplot(grid[0, 1])
     across, upward = (figure.add_subplot(grid[i, 1], sharex=history) for i in (1, 2))
-    orbit(trajectory, clearance, figure.add_subplot(grid[:, 0]))
-    time_history(trajectory, history).set_xlabel("")
-    force_history(trajectory, forces, 0, across).set_xlabel("")
-    force_history(trajectory, forces, 1, upward)
+    orbit(run, float(model.clearance), figure.add_subplot(grid[:, 0]))
+    time_history(run, history).set_xlabel("")
+    force_history(run, forces, 0, across).set_xlabel("")
+    force_history(run, forces, 1, upward)
     if (legend := across.get_legend()) is not None:
         legend.remove()
     return style.entitled(figure, title)
@@ -153,15 +146,39 @@ def _wide_limits(values: np.ndarray) -> tuple[float, float]:
     return min(low, centre - least), max(high, centre + least)
 
 
-def bearing_drawing(model: Any, run: Trajectory, history: RollerHistory, sample: int, ax: Axes | None = None) -> Axes:
-    """Rings, rollers and cage at one sample, to scale; arrows are the forces of the rollers on the bars of the cage.
+def _bearing_figure(model: Any, run: Trajectory, found: Rollers, title: str) -> Figure:
+    """The bearing at its largest pocket force, the path of the cage, slips and forces around it, spectra if any."""
+    history, rows = found.history, 4 if found.spectra else 3
+    figure = style.new_figure(12.0, 11.0 if found.spectra else 8.0)
+    grid = figure.add_gridspec(rows, 2, height_ratios=(2.4, 1, 1, 1)[:rows])
+    at = lambda row, column: style.dress(figure.add_subplot(grid[row, column]))
+    _drawing(at(0, 0), model, run, history)
+    path = at(0, 1)
+    _path_in_circle(path, history.place, 1.0, history.samples)
+    path.set(xlabel="Cage centre, horizontal / clearance", ylabel="Cage centre, vertical / clearance")
+    _slip_around(at(1, 0), found.around)
+    _pocket_force_around(at(1, 1), found.around)
+    forces = at(2, slice(None))
+    turns = np.abs(history.angle - history.angle[0]) / (2 * np.pi)
+    largest, land = np.abs(history.pocket_force).max(axis=1), np.hypot(*history.land_on_cage.T)
+    forces.plot(turns, largest, color=style.VERMILION, linewidth=0.6, label="largest pocket")
+    forces.plot(turns, land, color=style.BLUE, linewidth=0.8, label="land")
+    forces.set(xlim=(0, turns[-1]), xlabel="Revolutions of the cage", ylabel="Force [N]")
+    style.legend_beside(forces, 8)
+    for i, (name, spectrum) in enumerate(found.spectra.items()):
+        _spectrum(at(3, i), spectrum, found.orders, SPECTRA[name])
+        if i:
+            style.legend_beside(figure.axes[-1], 7)
+    return style.entitled(figure, title)
 
-    The displacement of the cage and its clearances, a few tenths of a millimetre, are not enlarged. The longest arrow
-    is the largest pocket force at any sample of the run.
+
+def _drawing(ax: Axes, model: Any, run: Trajectory, history: RollerHistory) -> None:
+    """Rings, rollers and cage at the sample of the largest pocket force, to scale; arrows are the forces of the rollers
+    on the bars of the cage. The displacement of the cage and its clearances, tenths of a millimetre, are not enlarged.
     """
-    ax = style.axes_or_new(ax, 6.0, 6.0)
     ax.grid(False)
     ax.spines[:].set_visible(False)
+    sample = int(np.abs(history.pocket_force).max(axis=1).argmax())
     bearing, ring = model.bearing, {"facecolor": style.GRID, "edgecolor": style.GREY, "linewidth": 0.8}
     outside, bore = MM * float(bearing.outside_diameter) / 2, MM * float(bearing.bore) / 2
     outer, inner = MM * float(model.outer_radius), MM * float(model.inner_radius)
@@ -176,19 +193,17 @@ def bearing_drawing(model: Any, run: Trajectory, history: RollerHistory, sample:
         ax.add_patch(Circle(tuple(centre), half, facecolor=face, edgecolor=style.BLACK, linewidth=0.7))
     for bar in _bars(model, run, sample):
         ax.add_patch(Polygon(bar, facecolor=style.ORANGE, edgecolor=style.BLACK, linewidth=0.5, alpha=0.55))
-    force = history.pocket_force[sample]
-    length = LONGEST_ARROW * 2 * outside * force / max(float(np.abs(history.pocket_force).max()), 1e-9)
-    pushed = np.abs(length) > 0.01 * LONGEST_ARROW * 2 * outside
+    force, longest = history.pocket_force[sample], LONGEST_ARROW * 2 * outside
+    length = longest * force / max(float(np.abs(force).max()), 1e-9)
+    pushed = np.abs(length) > 0.01 * longest
     begin, arrows = centres + np.sign(force)[:, None] * half * along, length[:, None] * along
     look: Any = dict(angles="xy", scale_units="xy", scale=1, width=0.005, color=style.VERMILION, zorder=5)
     ax.quiver(*begin[pushed].T, *arrows[pushed].T, **look)
     reach = (-1.06 * outside, 1.06 * outside)
     ax.set(xticks=[], yticks=[], aspect="equal", xlim=reach, ylim=reach)
-    largest = f"largest pocket force {np.abs(force).max():.0f} N (of {run.largest('pocket_force'):.0f} N at most"
-    ax.set_title(
-        f"{1e3 * (history.time[sample] - history.time[0]):.2f} ms: {largest}, between samples too)", fontsize=9
-    )
-    return ax
+    time, most = 1e3 * (history.time[sample] - history.time[0]), run.largest("pocket_force")
+    largest = f"largest pocket force {np.abs(force).max():.0f} N (of {most:.0f} N at most, between samples too)"
+    ax.set_title(f"{time:.2f} ms: {largest}", fontsize=9)
 
 
 def _bars(model: Any, run: Trajectory, sample: int) -> list[np.ndarray]:
@@ -209,44 +224,37 @@ def _bars(model: Any, run: Trajectory, sample: int) -> list[np.ndarray]:
     ]
 
 
-def slip_around(found: Around, ax: Axes | None = None) -> Axes:
+def _slip_around(ax: Axes, found: Around) -> None:
     """Mean slip of the rollers, and their sliding speed on the inner ring, over the circumference."""
-    ax = _around_axis(style.axes_or_new(ax, 7.0, 3.2), "Slip of the rollers [%]")
     other = ax.twinx()
     other.spines[["top", "left"]].set_visible(False)
+    _circumference(ax, "Slip of the rollers [%]")
     other.set_ylabel("Sliding on the inner ring [m/s]")
-    for axis, values, colour in (
-        (ax, 100 * found.roller_slip, style.BLUE),
-        (other, found.inner_sliding, style.VERMILION),
-    ):
+    slip, sliding = 100 * found.roller_slip, found.inner_sliding
+    for axis, values, colour in ((ax, slip, style.BLUE), (other, sliding, style.VERMILION)):
         axis.step(np.degrees(found.angle), values, where="mid", color=colour, linewidth=1.1)
         axis.yaxis.label.set_color(colour)
         axis.tick_params(axis="y", labelsize=9, colors=colour)
-    return ax
 
 
-def pocket_force_around(found: Around, ax: Axes | None = None) -> Axes:
+def _pocket_force_around(ax: Axes, found: Around) -> None:
     """Mean pocket force over the circumference, of rollers that drive the cage and of rollers that brake it."""
-    ax = _around_axis(style.axes_or_new(ax, 7.0, 3.2), "Mean pocket force [N]")
     degrees, width = np.degrees(found.angle), 0.9 * 360 / len(found.angle)
     ax.bar(degrees, found.driving_force, width, color=style.GREEN, label="rollers drive the cage")
     ax.bar(degrees, -found.braking_force, width, color=style.VERMILION, label="rollers brake the cage")
     ax.axhline(0, color=style.GREY, linewidth=0.8)
     ax.legend(frameon=False, fontsize=8, loc="upper left")
-    return ax
+    _circumference(ax, "Mean pocket force [N]")
 
 
-def _around_axis(ax: Axes, ylabel: str) -> Axes:
+def _circumference(ax: Axes, ylabel: str) -> None:
     ax.axvline(270, color=style.GREY, linewidth=0.8, linestyle="--")
-    ax.set(
-        xlim=(0, 360), xticks=range(0, 361, 90), xlabel="Place on the circumference [°], load at 270°", ylabel=ylabel
-    )
-    return ax
+    ax.set(xlim=(0, 360), xticks=range(0, 361, 90), ylabel=ylabel)
+    ax.set_xlabel("Place on the circumference [°], load at 270°")
 
 
-def marked_spectrum(spectrum: OrderSpectrum, orders: Mapping[str, float], ylabel: str, ax: Axes | None = None) -> Axes:
+def _spectrum(ax: Axes, spectrum: OrderSpectrum, orders: Mapping[str, float], ylabel: str) -> None:
     """Amplitudes by order of the cage speed, with the frequencies of the bearing marked."""
-    ax = style.axes_or_new(ax, 7.0, 3.0)
     keep = (spectrum.order > 0) & (spectrum.order <= 1.15 * max(orders.values()))
     amplitude = spectrum.amplitude[keep]
     ax.semilogy(spectrum.order[keep], np.maximum(amplitude, 1e-12), color=style.BLACK, linewidth=0.8)
@@ -254,41 +262,6 @@ def marked_spectrum(spectrum: OrderSpectrum, orders: Mapping[str, float], ylabel
         ax.axvline(order, color=colour, linewidth=1.1, linestyle="--", label=f"{name} {order:.3g}")
     ax.set(ylim=(0.5 * max(amplitude.min(), 1e-6 * amplitude.max()), 2 * amplitude.max()))
     ax.set(xlabel="Order of the cage speed", ylabel=ylabel)
-    style.legend_beside(ax, 7)
-    return ax
-
-
-def force_over_time(history: RollerHistory, ax: Axes | None = None) -> Axes:
-    """Largest pocket force, and the land's force on the cage, over the revolutions of the cage."""
-    ax = style.axes_or_new(ax, 7.0, 3.0)
-    turns = np.abs(history.angle - history.angle[0]) / (2 * np.pi)
-    ax.plot(
-        turns, np.abs(history.pocket_force).max(axis=1), color=style.VERMILION, linewidth=0.6, label="largest pocket"
-    )
-    ax.plot(turns, np.hypot(*history.land_on_cage.T), color=style.BLUE, linewidth=0.8, label="land")
-    ax.set(xlim=(0, turns[-1]), xlabel="Revolutions of the cage", ylabel="Force [N]")
-    style.legend_beside(ax, 8)
-    return ax
-
-
-def bearing_figure(model: Any, run: Trajectory, found: Rollers, title: str = "") -> Figure:
-    """The bearing at its largest pocket force, the path of the cage, slips and forces around it, spectra if any."""
-    history, rows = found.history, 4 if found.spectra else 3
-    figure = style.new_figure(12.0, 11.0 if found.spectra else 8.0)
-    grid = figure.add_gridspec(rows, 2, height_ratios=(2.4, 1, 1, 1)[:rows])
-    worst = int(np.abs(history.pocket_force).max(axis=1).argmax())
-    bearing_drawing(model, run, history, worst, figure.add_subplot(grid[0, 0]))
-    path = style.axes_or_new(figure.add_subplot(grid[0, 1]))
-    path_in_circle(path, history.place, 1.0, history.samples)
-    path.set(xlabel="Cage centre, horizontal / clearance", ylabel="Cage centre, vertical / clearance")
-    slip_around(found.around, figure.add_subplot(grid[1, 0]))
-    pocket_force_around(found.around, figure.add_subplot(grid[1, 1]))
-    force_over_time(history, figure.add_subplot(grid[2, :]))
-    for i, (name, spectrum) in enumerate(found.spectra.items()):
-        ax = marked_spectrum(spectrum, found.orders, SPECTRA.get(name, name), figure.add_subplot(grid[3, i]))
-        if i == 0 and (legend := ax.get_legend()) is not None:
-            legend.remove()
-    return style.entitled(figure, title)
 
 
 def load_bars(distribution: LoadDistribution, ax: Axes | None = None) -> Axes:
@@ -303,10 +276,3 @@ def load_bars(distribution: LoadDistribution, ax: Axes | None = None) -> Axes:
     ax.set(xlabel="Angle from the load [°]", ylabel="Roller load on the inner raceway [N]")
     ax.legend(frameon=False, fontsize=9)
     return ax
-
-
-def run_figure(model: Any, run: Trajectory, rollers: Rollers | None, title: str = "") -> Figure:
-    """The figure of one run of a cage, or of a bearing with its rollers."""
-    if rollers is not None:
-        return bearing_figure(model, run, rollers, title)
-    return simulation_figure(run, cage_forces(model, run), float(model.clearance), title)

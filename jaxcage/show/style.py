@@ -3,7 +3,7 @@
 The colours are those of Okabe and Ito (https://jfly.uni-koeln.de/color), made for red-green blindness.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -71,6 +71,22 @@ def drawn(draw: Callable[[Axes], Any], width: float = 9.0, height: float = 5.0, 
     return figure
 
 
+def panels(
+    draw: Sequence[Callable[[Axes], Any]], columns: int, size: tuple[float, float], title: str = "", **grid: Any
+) -> Figure:
+    """A figure with a panel for each of `draw`, row by row; only the lowest panels name an axis that they share."""
+    figure, rows = new_figure(*size), max(1, -(-len(draw) // columns))
+    cells = figure.subplots(rows, columns, squeeze=False, **grid).ravel()
+    for i, (panel, ax) in enumerate(zip(draw, cells, strict=False)):
+        panel(dress(ax))
+        if grid.get("sharex") and i < len(draw) - columns:
+            ax.set_xlabel("")
+    for ax in cells[len(draw) :]:
+        ax.remove()
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    return figure
+
+
 def axes_or_new(ax: Axes | None, width: float = 7.0, height: float = 4.5) -> Axes:
     """`ax` or the only axes of a new figure, in this style."""
     return dress(new_figure(width, height).subplots() if ax is None else ax)
@@ -88,34 +104,31 @@ def dress(ax: Axes) -> Axes:
 
 def dots(colour: str, size: float | int) -> dict[str, Any]:
     """Style of a cloud of points without a line."""
-    style = {"marker": ".", "linestyle": "none", "markeredgewidth": 0}
-    return style | {"color": colour, "markersize": size}
+    return {"marker": ".", "linestyle": "none", "markeredgewidth": 0, "color": colour, "markersize": size}
 
 
-def enlarge_dots(legend: Legend) -> Legend:
+def enlarge_dots(legend: Legend) -> None:
     """Draw small light points large and full in the legend, so that their colours can be told apart."""
     for handle in legend.get_lines():
         if handle.get_marker() == ".":
             handle.set(markersize=7, alpha=1.0)
-    return legend
 
 
-def legend_above(ax: Axes, ncols: int = 4, size: float | int = 9) -> Legend:
+def legend_above(ax: Axes, ncols: int = 4, size: float | int = 9) -> None:
     """A legend above the frame, where it hides nothing."""
-    place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": ncols}
-    return enlarge_dots(ax.legend(**place, frameon=False, fontsize=size))
+    enlarge_dots(ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=ncols, frameon=False, fontsize=size))
 
 
-def legend_beside(ax: Axes, size: float | int = 9) -> Legend:
+def legend_beside(ax: Axes, size: float | int = 9) -> None:
     """A legend to the right of the frame."""
     place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
-    return ax.legend(**place, frameon=False, fontsize=size, handlelength=1.4)
+    enlarge_dots(ax.legend(**place, frameon=False, fontsize=size, handlelength=1.4))
 
 
-def legend_below(figure: Figure, *axes: Axes, ncols: int = 5) -> None:
+def legend_below(figure: Figure, ncols: int = 5) -> None:
     """One legend for all axes, beneath them."""
     entries = {}
-    for ax in axes:
+    for ax in figure.axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     place = "outside lower center"

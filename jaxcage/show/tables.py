@@ -1,7 +1,7 @@
-"""Tables: columns of numbers with their units, turned into text only when they are shown.
+"""Tables: records and columns with units, turned into text only when they are shown.
 
-A table is shown on a terminal, in a report page, or as records of a JSON document, always from the same numbers. Units
-are converted by pint when a table is shown, and numbers carry the digits of their error.
+A table is shown on a terminal or in a report page, and its records stand in a JSON document. Units are converted by
+pint when a table is shown, and numbers carry the digits of their error.
 """
 
 import dataclasses
@@ -19,6 +19,8 @@ Beside = tuple[str, float] | None
 """Speed that is shown beside the model's: `shaft` or `cage`, and its ratio to the model's."""
 NOTHING = "-"
 """Cell of a value that is not known."""
+OWN = "each its own"
+"""Unit of a column whose records have different units, each under `unit`."""
 
 
 @functools.cache
@@ -33,82 +35,96 @@ def factor(unit: str, shown: str) -> float:
     return to_si(f"1 {unit}", shown)
 
 
-@dataclasses.dataclass(frozen=True)
-class Column:
-    """A column: its head, its values, and how they are shown."""
-
-    head: str
-    values: Sequence[Any]
-    """Numbers in `unit`, texts, or None for what is not known."""
-    unit: str = "1"
-    shown: str | None = None
-    """Unit in which numbers are shown; None takes that of `SHOWN`."""
-    errors: Sequence[float | None] | str | None = None
-    """Standard errors, or uncertainties, in `unit`; of a column for `rows_table` the key that holds them."""
-    digits: int | None = None
-    """Digits after the point; None takes those of the error, or four significant ones."""
-    key: str = ""
-    """Name in a document; the head if it is left out."""
-    nothing: str = NOTHING
-    """Cell of a value that is not known."""
-
-    @property
-    def unit_shown(self) -> str:
-        """Unit in which the numbers are shown."""
-        return SHOWN.get(self.unit, self.unit) if self.shown is None else self.shown
-
-    @property
-    def title(self) -> str:
-        """Head with the unit."""
-        return f"{self.head} [{self.unit_shown}]" if self.unit_shown else self.head
-
-    @property
-    def cells(self) -> list[str]:
-        """Values as texts."""
-        errors = [None] * len(self.values) if self.errors is None or isinstance(self.errors, str) else self.errors
-        return [self._cell(value, error) for value, error in zip(self.values, errors, strict=True)]
-
-    def _cell(self, value: Any, error: float | None) -> str:
-        if value is None or isinstance(value, str):
-            return value or self.nothing
-        if not math.isfinite(float(value)):
-            return self.nothing
-        if isinstance(value, bool | np.bool_):
-            return "yes" if value else "no"
-        if isinstance(value, int | np.integer) and self.unit_shown == SHOWN.get(self.unit, self.unit):
-            return str(value)
-        times = factor(self.unit, self.unit_shown)
-        return number(times * float(value), None if error is None else times * float(error), self.digits)
-
-
 def number(value: float, error: float | None = None, digits: int | None = None) -> str:
     """A number as text: with the digits of its error, with given digits, or with four significant ones."""
     if not math.isfinite(value):
         return NOTHING
-    if error is None or not math.isfinite(error) or error <= 0:
-        return f"{value:.{digits}f}" if digits is not None else _significant(value)
-    places = digits if digits is not None else max(0, 1 - math.floor(math.log10(error)))
-    return f"{value:.{places}f} ± {error:.{places}f}"
-
-
-def _significant(value: float, digits: int = 4) -> str:
-    """A number with so many significant digits, without an exponent where it is neither large nor small."""
+    if error is not None and math.isfinite(error) and error > 0:
+        places = digits if digits is not None else max(0, 1 - math.floor(math.log10(error)))
+        return f"{value:.{places}f} ± {error:.{places}f}"
+    if digits is not None:
+        return f"{value:.{digits}f}"
     if value == 0 or 1e-3 <= abs(value) < 1e6:
-        places = digits - 1 - (math.floor(math.log10(abs(value))) if value else 0)
-        return f"{value:.{max(places, 0)}f}"
-    return f"{value:.{digits - 1}e}"
+        return f"{value:.{max(3 - math.floor(math.log10(abs(value) or 1.0)), 0)}f}"
+    return f"{value:.3e}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Column:
+    """How the values under one key of the records are shown: numbers, texts, or None for what is not known."""
+
+    head: str
+    key: str = ""
+    """The head if it is left out."""
+    unit: str = "1"
+    """SI unit of numbers, or `OWN`."""
+    shown: str | None = None
+    """Unit in which numbers are shown; None takes that of `SHOWN`."""
+    error: str = ""
+    """Key of the standard errors, or uncertainties, in the same unit."""
+    digits: int | None = None
+    """Digits after the point; None takes those of the error, or four significant ones."""
+    nothing: str = NOTHING
+    """Cell of a value that is not known."""
+    times: float = 1.0
+    """Factor by which numbers are multiplied."""
+
+    @property
+    def name(self) -> str:
+        """Key of the values."""
+        return self.key or self.head
+
+    @property
+    def title(self) -> str:
+        """Head with the unit."""
+        shown = "" if self.unit == OWN else SHOWN.get(self.unit, self.unit) if self.shown is None else self.shown
+        return f"{self.head} [{shown}]" if shown else self.head
+
+    @property
+    def label(self) -> str:
+        """The same as words on the axis of a figure."""
+        words = self.title.replace("_", " ")
+        return words[:1].upper() + words[1:]
+
+    @property
+    def scale(self) -> float:
+        """Factor from the values to the numbers that are shown."""
+        return self._scale(self.unit)
+
+    def _scale(self, unit: str) -> float:
+        return self.times * factor(unit, SHOWN.get(unit, unit) if self.shown is None else self.shown)
+
+    def cell(self, record: Mapping[str, Any]) -> str:
+        """The value of a record as text."""
+        value = record.get(self.name)
+        if value is None or isinstance(value, str):
+            return (SHOWN.get(value, value) if value and self.name == "unit" else value) or self.nothing
+        if isinstance(value, bool | np.bool_):
+            return "yes" if value else "no"
+        if not math.isfinite(float(value)):
+            return self.nothing
+        times = self._scale(record["unit"] if self.unit == OWN else self.unit)
+        if isinstance(value, int | np.integer) and times == 1.0:
+            return str(value)
+        error = record.get(self.error)
+        return number(times * float(value), None if error is None else times * float(error), self.digits)
+
+
+UNIT = Column("unit", nothing="")
+"""The unit in which the numbers of a record are shown in columns of unit `OWN`."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Table:
-    """A titled table of columns that have the same length."""
+    """A titled table of records."""
 
     title: str
     columns: Sequence[Column]
+    records: Sequence[Mapping[str, Any]]
     key: str = ""
     """Name under which the records stand in a document; without one they do not."""
-    data: Sequence[Mapping[str, Any]] | None = None
-    """The records, where they hold more than the columns show."""
+    empty: str = "none"
+    """Text of the only row where there are no records."""
 
     @property
     def heads(self) -> list[str]:
@@ -118,82 +134,46 @@ class Table:
     @property
     def rows(self) -> list[tuple[str, ...]]:
         """Cells as texts, row by row."""
-        return list(zip(*(column.cells for column in self.columns), strict=True))
+        nothing = (self.empty, *len(self.columns[1:]) * ("",))
+        return [tuple(c.cell(record) for c in self.columns) for record in self.records] or [nothing]
 
     @property
-    def records(self) -> list[dict[str, Any]]:
-        """Numbers in SI units, or in the unit of the head, row by row, for a document."""
-        if self.data is not None:
-            return [dict(row) for row in self.data]
-        found = [{(c.key or c.head): c.values[i] for c in self.columns} for i in range(len(self))]
-        for column in self.columns:
-            if column.errors is not None and not isinstance(column.errors, str):
-                for record, error in zip(found, column.errors, strict=True):
-                    record[f"{column.key or column.head}_error"] = error
-        return found
-
-    def __len__(self) -> int:
-        return len(self.columns[0].values)
+    def texts(self) -> list[bool]:
+        """True for each column that holds no numbers."""
+        return [all(isinstance(r.get(c.name), str | None) for r in self.records) for c in self.columns]
 
     def __str__(self) -> str:
-        lines = [self.heads, *map(list, self.rows)]
-        widths = [max(len(line[i]) for line in lines) for i in range(len(self.columns))]
-        first = lambda line: f"{line[0]:<{widths[0]}}"
-        rest = lambda line: [f"{cell:>{width}}" for cell, width in zip(line[1:], widths[1:], strict=True)]
-        return "\n".join([self.title, *("  ".join([first(line), *rest(line)]).rstrip() for line in lines)])
+        lines = [tuple(self.heads), *self.rows]
+        widths = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
+        aligned = lambda line: [f"{cell:>{width}}" for cell, width in zip(line[1:], widths[1:], strict=True)]
+        return "\n".join([self.title, *("  ".join([f"{x[0]:<{widths[0]}}", *aligned(x)]).rstrip() for x in lines)])
 
 
-def rows_table(
-    title: str, rows: Iterable[Mapping[str, Any]], columns: Iterable[Column], key: str = "", empty: str = "none"
+def table(
+    title: str,
+    records: Iterable[Mapping[str, Any]],
+    columns: Iterable[Column | str],
+    key: str = "",
+    empty: str = "none",
 ) -> Table:
-    """A table of records, which stand in a document under `key`: each column takes the values, and the errors, under
-    its keys. Without a record there is a row that says `empty`."""
-    found, columns = list(rows), list(columns)
-    shown = found or [{columns[0].key or columns[0].head: empty}]
-    pick = lambda key: [row.get(key) for row in shown]
-
-    def filled(column: Column) -> Column:
-        errors = pick(column.errors) if isinstance(column.errors, str) else column.errors
-        nothing = column.nothing if found else ""
-        return dataclasses.replace(column, values=pick(column.key or column.head), errors=errors, nothing=nothing)
-
-    return Table(title, [filled(column) for column in columns], key, found)
-
-
-@dataclasses.dataclass(frozen=True)
-class Scaled(Column):
-    """A column that shows its values times a ratio."""
-
-    ratio: float = 1.0
-
-    def _cell(self, value: Any, error: float | None) -> str:
-        return super()._cell(value if value is None or isinstance(value, str) else self.ratio * float(value), None)
+    """A table of records, which stand in a document under `key`; a column that is a text is the key of its values."""
+    columns = [Column(column) if isinstance(column, str) else column for column in columns]
+    return Table(title, columns, list(records), key, empty)
 
 
 def speed_columns(
-    head: str, key: str, beside: Beside, errors: str | None = None, digits: int = 0, nothing: str = NOTHING
+    head: str, key: str, beside: Beside, error: str = "", digits: int = 0, nothing: str = NOTHING
 ) -> list[Column]:
-    """Columns for `rows_table` of a speed [rpm], or a difference of speeds, and of the speed that goes with it."""
-    own = Column(head, (), key=key, errors=errors, digits=None if errors else digits, nothing=nothing)
-    return [own] if beside is None else [own, Scaled(beside[0], (), key=key, digits=digits, ratio=beside[1])]
+    """Columns of a speed [rpm], or a difference of speeds, and of the speed that goes with it."""
+    own = Column(head, key, error=error, digits=None if error else digits, nothing=nothing)
+    return [own] if beside is None else [own, Column(beside[0], key, digits=digits, times=beside[1])]
 
 
 def shares_table(title: str, sort: str, counts: Mapping[str, int]) -> Table:
     """Numbers of each sort, and their shares of all."""
     total = sum(counts.values())
-    shares = Column("share", [n / total for n in counts.values()], "1", "%", digits=1)
-    return Table(title, [Column(sort, list(counts)), Column("number", list(counts.values())), shares])
-
-
-def value_table(title: str, rows: Iterable[tuple[str, Any, str]], errors: Sequence[float] | None = None) -> Table:
-    """A table of quantities: their words, values and SI units, and standard errors."""
-    found = list(rows)
-    each = [
-        Column("", [value], unit, errors=[e]) for (_, value, unit), e in zip(found, errors or [math.nan] * len(found))
-    ]
-    units = ["" if isinstance(column.values[0], str) else column.unit_shown for column in each]
-    words = Column("quantity", [what for what, _, _ in found])
-    return Table(title, [words, Column("value", [c.cells[0] for c in each]), Column("unit", units, nothing="")])
+    rows = [{sort: what, "number": n, "share": n / total} for what, n in counts.items()]
+    return table(title, rows, [sort, "number", Column("share", shown="%", digits=1)])
 
 
 def counted(number: int, what: str) -> str:

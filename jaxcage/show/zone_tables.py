@@ -1,20 +1,28 @@
 """Zones found in a sweep or by a search beside the published ones; bifurcations, stable stretches of orbits."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from .. import analysis
-from ..analysis import Zone, Zones, lives_in_words
+from .._errors import NoResult
+from ..analysis import Stretch as Motion, Zone, Zones, failed, lives_in_words, outcomes
 from ..bearing import PublishedCase
 from ..orbits import LossZones, Point, StableRange, SynchronousOrbits
-from .tables import Beside, Column, Table, chosen, number, rows_table, speed_columns
+from .tables import Beside, Column, Table, chosen, number, speed_columns, table
 
 
 ENDS = ("onset", "exit")
 Span = tuple[float, float | None]
+
+
+def require_some(found: xr.Dataset, where: str = "") -> None:
+    """**Raises:** `NoResult` if every lane failed, with their number, `where`, and how they ended."""
+    if failed(found).all():
+        said = f"All {found['label'].size} simulations{where} failed ({', '.join(sorted(outcomes(found)))})"
+        raise NoResult(f"{said}: try more steps (--steps).")
 
 
 def published_zones(published: PublishedCase | None) -> list[Span]:
@@ -28,13 +36,18 @@ def zone_record(zone: Zone) -> dict[str, Any]:
     """A zone for tables and documents; an end is None where it runs past the range."""
     found: dict[str, Any] = {"kind": zone.kind, "width_rpm": zone.width_rpm, "share": zone.share}
     for end, edge in zip(ENDS, (zone.onset, zone.exit), strict=True):
-        values = (None,) * 4 if edge is None else (edge.speed_rpm, edge.uncertainty_rpm, edge.mechanism, edge.basis)
-        found |= {
-            f"{end}_{n}": x for n, x in zip(("rpm", "uncertainty_rpm", "mechanism", "basis"), values, strict=True)
-        }
+        found[f"{end}_rpm"] = None if edge is None else edge.speed_rpm
+        for name in ("uncertainty_rpm", "mechanism", "basis"):
+            found[f"{end}_{name}"] = None if edge is None else getattr(edge, name)
     for name in ("revolutions", "seconds", "bound"):
         found[f"mean_life_{name}"] = None if zone.life is None else [getattr(life, name) for life in zone.life]
     return found
+
+
+def zone_span(zone: Zone, lowest: float = -math.inf, highest: float = math.inf) -> tuple[float, float]:
+    """Onset and exit of a zone [rpm], or the limits in place of an end that it does not have."""
+    low, high = zone.onset, zone.exit
+    return lowest if low is None else low.speed_rpm, highest if high is None else high.speed_rpm
 
 
 def zone_words(zone: Zone) -> str:
@@ -45,22 +58,43 @@ def zone_words(zone: Zone) -> str:
     return f"from {low:.0f} rpm on" if math.isinf(high) else f"{low:.0f} to {high:.0f} rpm"
 
 
-def zones_table(
-    name: str, zones: Zones, published: PublishedCase | None, swept: tuple[float, float], beside: Beside = None
+def motion_tables(
+    name: str,
+    sweep: xr.Dataset,
+    found: Zones | Sequence[Motion],
+    published: PublishedCase | None = None,
+    beside: Beside = None,
+) -> list[Table]:
+    """Chaotic zones, their edges and mean lives, zones of chaos that dies out, each if there are any; or stretches of
+    speed with the same labels."""
+    if not isinstance(found, Zones):
+        rows = [vars(each) | {"motion": " or ".join(each.labels)} for each in found]
+        columns = [Column("from", "low_rpm", digits=0), Column("to", "high_rpm", digits=0), "motion"]
+        columns += [Column("exponent", error="exponent_error"), "chaotic", "speeds"]
+        title = f"Zones of {name} [rpm], each edge half way between two speeds of the sweep"
+        return [table(title, rows, columns, "zones")]
+    lasting = f", chaos that lasts beyond {found.horizon} revolutions" if found.horizon else ""
+    title = f"Chaotic zones of {name} [rpm], resolution {found.resolution_rpm:.0f} rpm{lasting}"
+    span = float(sweep["rpm"][0]), float(sweep["rpm"][-1])
+    transient = f"Transient chaos of {name}, mean life below {found.horizon} revolutions"
+    return [
+        _beside_published(title, "zones", found.zones, published, span, beside),
+        *_details(f"Chaotic zones of {name} in detail", found.zones),
+        *_details(transient, found.transient, "transient"),
+    ]
+
+
+def loss_table(
+    name: str, found: SynchronousOrbits, loss: LossZones, published: PublishedCase | None, beside: Beside = None
 ) -> Table:
-    """Chaotic zones, each published zone beside the one that shares most speeds with it."""
-    lasting = f", chaos that lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
-    title = f"Chaotic zones of {name} [rpm], resolution {zones.resolution_rpm:.0f} rpm{lasting}"
-    return beside_published(title, "zones", zones.zones, published, swept, beside)
+    """Zones without a stable synchronous orbit, each published (chaotic) zone beside the one it shares most with."""
+    title = f"Synchronous-loss zones of {name} [rpm], closed below {loss.close_below_rpm:.0f} rpm"
+    between = found.lower_rpm, found.upper_rpm
+    return _beside_published(title, "synchronous_loss", loss.zones, published, between, beside)
 
 
-def beside_published(
-    title: str,
-    key: str,
-    zones: Sequence[Zone],
-    published: PublishedCase | None,
-    range_rpm: tuple[float, float],
-    beside: Beside,
+def _beside_published(
+    title: str, key: str, zones: Sequence[Zone], published: PublishedCase | None, range_rpm: Span, beside: Beside
 ) -> Table:
     """A row for each zone, with the published zones that share most speeds with it.
 
@@ -68,64 +102,22 @@ def beside_published(
     """
     partners: dict[int | None, list[Span]] = {}
     for span in published_zones(published):
-        outside = span[0] > range_rpm[1] or (span[1] is not None and span[1] < range_rpm[0])
+        outside = span[0] > (range_rpm[1] or math.inf) or (span[1] is not None and span[1] < range_rpm[0])
         partners.setdefault(-1 if outside else _partner(span, zones), []).append(span)
     rows = [
         {"zone": i + 1, **zone_record(zone), "published": _words(partners.get(i, []))} for i, zone in enumerate(zones)
     ]
-    columns = [Column("zone", ())]
+    columns: list[Column | str] = ["zone"]
     for end in ENDS:
         columns += speed_columns(end, f"{end}_rpm", beside, f"{end}_uncertainty_rpm", nothing="past range")
     columns += speed_columns("width", "width_rpm", None, nothing="open")
-    columns += [] if published is None else [Column("published", ())]
     missing = {None: "Published, but not found", -1: "Published beyond this range"}
     notes = [f"{words}: {_words(partners[which])}" for which, words in missing.items() if which in partners]
-    return rows_table("\n".join([title, *notes]), rows, columns, key)
-
-
-def zone_details(title: str, zones: Sequence[Zone], key: str = "") -> list[Table]:
-    """Mechanisms of the edges, share of chaotic initial states and mean life of chaos of each zone, if any."""
-    rows = [
-        zone_record(zone) | {"zone": f"{i}: {zone_words(zone)}", "life": _life(zone)}
-        for i, zone in enumerate(zones, start=1)
-    ]
-    columns = [Column("zone", ()), *(Column(f"{end} by", (), key=f"{end}_mechanism") for end in ENDS)]
-    columns.append(Column("share", (), "1", "%", digits=0))
-    columns += [Column("mean life [revolutions]", (), key="life")] if any(zone.life for zone in zones) else []
-    return [rows_table(title, rows, columns, key)] if rows else []
-
-
-def transient_tables(name: str, zones: Zones, beside: Beside = None) -> list[Table]:
-    """Zones of chaos that dies out before the horizon, if there are any."""
-    title = f"Transient chaos of {name}, mean life below {zones.horizon} revolutions"
-    return zone_details(title, zones.transient, "transient")
-
-
-def stretches_table(name: str, found: Iterable[analysis.Stretch]) -> Table:
-    """Stretches of speed in which the lanes have the same labels."""
-    rows = [vars(each) | {"motion": " or ".join(each.labels)} for each in found]
-    columns = [Column(head, (), key=key, digits=0) for head, key in (("from", "low_rpm"), ("to", "high_rpm"))]
-    columns += [Column("motion", ()), Column("exponent", (), errors="exponent_error"), Column("chaotic", ())]
-    title = f"Zones of {name} [rpm], each edge half way between two speeds of the sweep"
-    return rows_table(title, rows, [*columns, Column("speeds", ())], "zones")
-
-
-def _life(zone: Zone) -> str:
-    """Mean lives in revolutions and, each at its own speed, in seconds."""
-    if zone.life is None:
-        return ""
-    each = (lives_in_words(zone.life, f) for f in (lambda x: f"{x.revolutions:.0f}", lambda x: f"{x.seconds:.1f}"))
-    return "{} ({} s)".format(*each)
+    return table("\n".join([title, *notes]), rows, [*columns, *([] if published is None else ["published"])], key)
 
 
 def _words(spans: Sequence[Span]) -> str:
     return ", ".join(f"{a:.0f}{' and up' if b is None else f' to {b:.0f}'}" for a, b in spans)
-
-
-def zone_span(zone: Zone, lowest: float = -math.inf, highest: float = math.inf) -> tuple[float, float]:
-    """Onset and exit of a zone [rpm], or the limits in place of an end that it does not have."""
-    low, high = zone.onset, zone.exit
-    return lowest if low is None else low.speed_rpm, highest if high is None else high.speed_rpm
 
 
 def _partner(span: Span, zones: Sequence[Zone]) -> int | None:
@@ -134,6 +126,24 @@ def _partner(span: Span, zones: Sequence[Zone]) -> int | None:
     shared = [min(high, top) - max(low, span[0]) for low, high in map(zone_span, zones)]
     best = max(range(len(shared)), key=shared.__getitem__, default=None)
     return best if best is not None and shared[best] > 0 else None
+
+
+def _details(title: str, zones: Sequence[Zone], key: str = "") -> list[Table]:
+    """Mechanisms of the edges, share of chaotic initial states, and mean life of chaos in revolutions and, each at its
+    own speed, in seconds; nothing if there are no zones."""
+    rows = []
+    for i, zone in enumerate(zones, start=1):
+        row = zone_record(zone) | {"zone": f"{i}: {zone_words(zone)}"}
+        if zone.life is not None:
+            turns, seconds = (
+                lives_in_words(zone.life, f) for f in (lambda x: f"{x.revolutions:.0f}", lambda x: f"{x.seconds:.1f}")
+            )
+            row["life"] = f"{turns} ({seconds} s)"
+        rows.append(row)
+    columns = ["zone", *(Column(f"{end} by", f"{end}_mechanism") for end in ENDS)]
+    columns.append(Column("share", shown="%", digits=0))
+    columns += [Column("mean life [revolutions]", "life")] if any(zone.life for zone in zones) else []
+    return [table(title, rows, columns, key)] if rows else []
 
 
 AT_LIMIT_RPM = 1e-6
@@ -154,9 +164,17 @@ def point_record(point: Point, found: SynchronousOrbits, name: str | None = None
     }
 
 
+def stretch_table(name: str, found: SynchronousOrbits, beside: Beside = None) -> Table:
+    """Stretches of speed in which a synchronous orbit is stable, and what ends them [rpm]: a kind of bifurcation,
+    `range` where the stretch runs past the range, or `unknown` where the branch was not followed further."""
+    rows, columns = [_stretch_record(s, found) for s in found.stretches], []
+    for head, end in (("from", "lower"), ("to", "upper")):
+        columns += [*speed_columns(head, f"{end}_rpm", beside, digits=2), Column("by", f"{end}_kind")]
+    columns += [Column("width", "width_rpm", digits=2), Column("settled", "met"), "branch"]
+    return table(f"Stable synchronous orbits of {name} [rpm]", rows, columns, "stretches")
+
+
 def _stretch_record(stretch: StableRange, found: SynchronousOrbits) -> dict[str, Any]:
-    """A stable stretch, which begins and ends by a kind of bifurcation, by `range` where it runs past the range, or by
-    `unknown` where the branch was not followed further."""
     record = chosen(stretch, "lower_rpm upper_rpm width_rpm branch confirmed family met met_first")
     for end in ("lower", "upper"):
         point, at_limit = getattr(stretch, end), abs(record[f"{end}_rpm"] - getattr(found, f"{end}_rpm")) < AT_LIMIT_RPM
@@ -164,56 +182,19 @@ def _stretch_record(stretch: StableRange, found: SynchronousOrbits) -> dict[str,
     return record
 
 
-def orbits_document(found: SynchronousOrbits, loss: LossZones) -> dict[str, Any]:
-    """All bifurcations that a search found, and the orbits there are at the speed of each named edge."""
-    pairs = lambda multipliers: [[float(mu.real), float(mu.imag)] for mu in multipliers]
-    return {
-        "range_rpm": [found.lower_rpm, found.upper_rpm],
-        "close_below_rpm": loss.close_below_rpm,
-        "points": [point_record(p, found) for p in found.points],
-        "unexplained": [point_record(p, found) for p in found.unexplained],
-        "coexisting": {
-            name: [{"branch": i, "stable": stable, "state": y, "multipliers": pairs(mu)} for i, stable, y, mu in orbits]
-            for name, orbits in loss.coexisting.items()
-        },
-        **chosen(found, "missed unsettled"),
-    }
-
-
-def stretch_table(name: str, found: SynchronousOrbits, beside: Beside = None) -> Table:
-    """Stretches of speed in which a synchronous orbit is stable, and the bifurcations at their ends [rpm]."""
-    rows, columns = [_stretch_record(s, found) for s in found.stretches], []
-    for head, end in (("from", "lower"), ("to", "upper")):
-        columns += [*speed_columns(head, f"{end}_rpm", beside, digits=2), Column("by", (), key=f"{end}_kind")]
-    columns += [Column("width", (), key="width_rpm", digits=2), Column("settled", (), key="met"), Column("branch", ())]
-    return rows_table(f"Stable synchronous orbits of {name} [rpm]", rows, columns, "stretches")
-
-
-def loss_table(
-    name: str, found: SynchronousOrbits, loss: LossZones, published: PublishedCase | None, beside: Beside = None
-) -> Table:
-    """Zones without a stable synchronous orbit, each published (chaotic) zone beside the one it shares most with."""
-    title = f"Synchronous-loss zones of {name} [rpm], closed below {loss.close_below_rpm:.0f} rpm"
-    between = found.lower_rpm, found.upper_rpm
-    return beside_published(title, "synchronous_loss", loss.zones, published, between, beside)
-
-
-def edge_table(found: SynchronousOrbits, loss: LossZones, beside: Beside = None, named: bool = False) -> Table:
-    """Bifurcations at which a stable synchronous orbit begins or ends; with `named` those that bound a zone."""
+def edge_table(found: SynchronousOrbits, loss: LossZones, beside: Beside = None) -> Table:
+    """Bifurcations at which a stable synchronous orbit begins or ends."""
     names = {id(point): name for name, point in loss.edges.items()}
-    rows = [point_record(p, found, names.get(id(p))) for p in found.edges if not named or id(p) in names]
+    rows = [point_record(p, found, names.get(id(p))) for p in found.edges]
     for row in rows:
         both = f" ± {row['multiplier'][1]:.4f}i" if row["kind"] == "Neimark-Sacker" else ""
         row["critical"] = f"{row['multiplier'][0]:.4f}{both}"
-    columns = [
-        *speed_columns("speed", "speed_rpm", beside, "error_rpm"),
-        Column("kind", ()),
-        Column("multiplier", (), key="critical"),
-        Column("angle", (), "deg", key="angle_deg", digits=2),
-        Column("branch", ()),
-        Column("edge of", (), key="name"),
-    ]
-    return rows_table("Ends of the stable synchronous orbits [rpm]", rows, columns, "edges")
+    speed, angle = (
+        speed_columns("speed", "speed_rpm", beside, "error_rpm"),
+        Column("angle [deg]", "angle_deg", digits=2),
+    )
+    columns = [*speed, "kind", Column("multiplier", "critical"), angle, "branch", Column("edge of", "name")]
+    return table("Ends of the stable synchronous orbits [rpm]", rows, columns, "edges")
 
 
 def unsettled_notes(found: SynchronousOrbits) -> list[str]:

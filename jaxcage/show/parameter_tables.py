@@ -1,13 +1,14 @@
-"""Parameters of a model with their units and sources, and the readings of what the paper leaves open."""
+"""Parameters of a model with their units and sources, those in which two designs differ, readings of the paper."""
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .._parameters import EXTRA, get, readings_of, walk
-from ..files import is_range
+from ..files import configuration, is_range
 from ..models import AbstractForcedSystem
-from .tables import Column, Table, rows_table
+from .tables import OWN, UNIT, Column, Table, table as table_of
 
 
 SHOWN = {"m^2/s": ("mm²/s", 1e6, 0.0), "K": ("°C", 1.0, -273.15), "Pa": ("GPa", 1e-9, 0.0), "1": ("", 1.0, 0.0)}
@@ -48,9 +49,8 @@ def sources_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, 
             source = "a force of your own"
         else:
             source = _published(model, path, field) if table is None else _in_file(path, table)
-        rows.append({"part": part, "parameter": text, "value": str(value), "unit": unit, "from": source, "name": name})
-    heads = ("part", "parameter", "value", "unit", "from")
-    return rows_table("All parameters", rows, [Column(head, ()) for head in heads])
+        rows.append({"part": part, "parameter": text, "value": str(value), "shown": unit, "from": source, "name": name})
+    return table_of("All parameters", rows, ["part", "parameter", "value", Column("unit", "shown"), "from"])
 
 
 def shown(value: float, unit: str) -> tuple[str, float]:
@@ -91,3 +91,37 @@ def _in_file(path: tuple[str, ...], table: Mapping[str, Any]) -> str:
 def readings_words(model: Any) -> str:
     """The readings in one line: `radial clearance c = C_r/2 ("radial"), unbalance M e omega^2 ("physical")`."""
     return ", ".join(f'{READINGS[name]} {words} ("{chosen}")' for name, (chosen, words) in readings_of(model).items())
+
+
+def differences(models: Sequence[Any]) -> list[dict[str, Any]]:
+    """Dotted name, text, both values [SI], unit and relative change of each parameter or choice in which two designs
+    differ."""
+    flat = [_flat(configuration(model)) for model in models]
+    about = {".".join(path): field.metadata for model in models for path, field in walk(model)}
+    found = []
+    for path in dict.fromkeys([*flat[0], *flat[1]]):
+        before, after = values = [each.get(path) for each in flat]
+        if before == after:
+            continue
+        info = about.get(path, {}).get("parameter")
+        row = {"name": path, "text": (info.text if info else about.get(path, {}).get("text")) or path, "values": values}
+        numbers = all(isinstance(v, float | int) and math.isfinite(v) for v in values)
+        change = after / before - 1 if numbers and before and (info is None or info.unit != "K") else None
+        found.append(row | {"unit": info.unit if info else "1", "change": change})
+    return found
+
+
+def differences_table(names: Sequence[str], models: Sequence[Any]) -> Table:
+    """Every value in which two designs differ."""
+    text = lambda x: x if x is None or isinstance(x, float) else str(x)
+    rows = [row | dict(zip(names, map(text, row["values"]), strict=True)) for row in differences(models)]
+    columns = [Column("value", "text"), *(Column(name, unit=OWN) for name in names), UNIT]
+    columns.append(Column("change", shown="%", digits=1))
+    return table_of(f"Differences between {' and '.join(names)}", rows, columns, "differences", empty="nothing")
+
+
+def _flat(nested: Mapping[str, Any], path: tuple[str, ...] = ()) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in nested.items():
+        found |= _flat(value, (*path, key)) if isinstance(value, Mapping) else {".".join((*path, key)): value}
+    return found

@@ -10,11 +10,11 @@ from ..design import LastingEdge, MeanGradient, SolvedEdge, ZoneWidth, zone_widt
 from ..models import AbstractForcedSystem
 from ..orbits import Cascade, Explained, LossZones, Sensitivity, limit_sensitivity, sensitivities, sensitivity
 from ..solve import AbstractMethod
-from .tables import Beside, Column, Table, chosen, number, rows_table, speed_columns
+from .tables import Beside, Column, Table, chosen, number, speed_columns, table
 
 
 FIRST = ("guidance_gap", "eccentricity")
-"""Parameters whose rows are always on top."""
+"""Parameters that are always on top."""
 FIXED_RHO = "gap at fixed rho"
 """Change of the gap with which the eccentricity grows, so that rho = e/C_r stays.
 
@@ -23,13 +23,6 @@ of clearance, film and land. With the physical one it does not.
 """
 TURNED = ("drawing", "catalogue", "oil", "operating")
 """Kinds of parameters that a designer or a user chooses."""
-EXPECTED = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
-
-
-def _asked(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
-    """Parameters alone, and gap and eccentricity together."""
-    asked: dict[str, tuple[str, ...]] = {n: (n,) for n in names}
-    return asked | ({FIXED_RHO: FIRST} if set(FIRST) <= set(asked) else {})
 
 
 def to_be_turned(model: AbstractForcedSystem, slopes: Iterable[Sensitivity]) -> list[Sensitivity]:
@@ -39,12 +32,6 @@ def to_be_turned(model: AbstractForcedSystem, slopes: Iterable[Sensitivity]) -> 
     return [
         dataclasses.replace(s, elasticity={n: value for n, value in s.elasticity.items() if stays(n)}) for s in slopes
     ]
-
-
-def not_fixed(model: AbstractForcedSystem, names: Iterable[str]) -> list[str]:
-    """Parameters that have a tolerance: all but definitions, units and constants of nature and of the numerics."""
-    info = parameter_info(model)
-    return [n for n in names if info[n].kind != "fixed" or n.startswith(EXTRA)]
 
 
 def edge_slopes(
@@ -58,26 +45,18 @@ def edge_slopes(
     return slopes
 
 
-def slope_record(name: str, slope: Sensitivity) -> dict[str, Any]:
-    """The gradient of an edge or a width [rpm per SI unit] for tables and documents."""
-    fixed = sum(slope.elasticity.get(n, math.nan) for n in FIRST)
-    at = {"name": name, "speed_rpm": slope.value_rpm, "elasticity_gap_at_fixed_rho": fixed}
-    return at | chosen(slope, "kind error_rpm steps trusted status transversality derivative elasticity homogeneity")
-
-
 def elasticities_table(name: str, slopes: Mapping[str, Sensitivity], beside: Beside = None) -> Table:
     """Relative change of each edge by that of the parameters that are always on top."""
-    rows = [slope_record(edge, slope) for edge, slope in slopes.items()]
-    shown = [row | {n: row["elasticity"].get(n) for n in FIRST} for row in rows]
-    columns = [
-        Column("edge", (), key="name"),
-        Column("by", (), key="kind"),
-        *speed_columns("speed [rpm]", "speed_rpm", beside, "error_rpm"),
-        *(Column(n.replace("_", " "), (), key=n, digits=4) for n in FIRST),
-        Column("status", ()),
+    names = "kind error_rpm steps trusted status transversality derivative elasticity homogeneity"
+    rows = [
+        {"name": edge, "speed_rpm": slope.value_rpm, **chosen(slope, names)}
+        | {n: slope.elasticity.get(n) for n in FIRST}
+        for edge, slope in slopes.items()
     ]
-    table = rows_table(f"Elasticities of the exact edges of {name}", shown, columns, "edges")
-    return dataclasses.replace(table, data=rows)
+    columns = [Column("edge", "name"), Column("by", "kind")]
+    columns += speed_columns("speed [rpm]", "speed_rpm", beside, "error_rpm")
+    columns += [Column(n.replace("_", " "), n, digits=4) for n in FIRST]
+    return table(f"Elasticities of the exact edges of {name}", rows, [*columns, "status"], "edges")
 
 
 def gradient_table(name: str, model: AbstractForcedSystem, slope: Sensitivity) -> Table:
@@ -89,23 +68,16 @@ def gradient_table(name: str, model: AbstractForcedSystem, slope: Sensitivity) -
     moving = [n for n in slope.derivative if slope.derivative[n] != 0.0 or n in FIRST]
     moving.sort(key=lambda n: (FIRST.index(n) if n in FIRST else len(FIRST), -abs(change[n])))
     rows: list[dict[str, Any]] = [
-        {"parameter": n, "value": float(value[n]), "unit": "" if info[n].unit == "1" else info[n].unit}
+        {"parameter": n, "value": float(value[n]), "SI unit": "" if info[n].unit == "1" else info[n].unit}
         | {"slope": slope.derivative[n], "elasticity": change[n]}
         for n in moving
     ]
     rows.insert(len(FIRST), {"parameter": FIXED_RHO, "elasticity": sum(change.get(n, math.nan) for n in FIRST)})
-    columns = [Column(head, ()) for head in ("parameter", "value", "unit")]
-    columns += [Column("rpm of the cage per unit", (), key="slope"), Column("elasticity", (), digits=6)]
     title = f"{slope.name.capitalize()} of {name}: {number(slope.value_rpm, float(slope.error_rpm))} rpm, {slope.kind}"
-    still = len(slope.derivative) - len(moving)
-    return rows_table(title + (f"; {still} other parameters do not move it" if still else ""), rows, columns)
-
-
-def missing_notes(edges: Mapping[str, Sensitivity]) -> list[str]:
-    """Edges that one would expect and that are not there or not to be trusted, and how good the gradients are."""
-    notes = [f"There is no {name} in the range." for name in EXPECTED if name not in edges]
-    notes += [f"Left out: {n}, {e.kind} ({e.status})." for n, e in edges.items() if not e.trusted]
-    return [*notes, f"Gradients against the scaling of units, largest relative residual: {residual_words(edges)}"]
+    if still := len(slope.derivative) - len(moving):
+        title += f"; {still} other parameters do not move it"
+    columns = [Column("rpm of the cage per unit", "slope"), Column("elasticity", digits=6)]
+    return table(title, rows, ["parameter", "value", "SI unit", *columns])
 
 
 def residual_words(edges: Mapping[str, Sensitivity]) -> str:
@@ -128,8 +100,14 @@ def source_notes(explained: Explained) -> list[str]:
     return notes
 
 
+def _asked(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Parameters alone, and gap and eccentricity together."""
+    asked: dict[str, tuple[str, ...]] = {n: (n,) for n in names}
+    return asked | ({FIXED_RHO: FIRST} if set(FIRST) <= set(asked) else {})
+
+
 def _error_columns(names: Iterable[str], digits: int | None = None) -> list[Column]:
-    return [Column(n.replace("_", " "), (), key=n, errors=f"{n}_error", digits=digits) for n in _asked(names)]
+    return [Column(n.replace("_", " "), n, error=f"{n}_error", digits=digits) for n in _asked(names)]
 
 
 def _with_errors(found: Mapping[str, tuple[float, float]], factor: float = 1.0) -> dict[str, float]:
@@ -145,11 +123,10 @@ def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int, bes
         | _with_errors({n: edge.sum_of(*of) for n, of in _asked(names).items()})
         for each, edge in edges.items()
     ]
-    columns = [Column("edge", (), key="name")]
-    columns += speed_columns("speed [rpm]", "speed_rpm", beside, "standard_error_rpm")
-    columns += [*_error_columns(names), Column("escapes", ()), Column("status", ())]
+    speed = speed_columns("speed [rpm]", "speed_rpm", beside, "standard_error_rpm")
+    columns = [Column("edge", "name"), *speed, *_error_columns(names), "escapes", "status"]
     title = f"Elasticities of the edges of {name} at which the mean life of chaos passes {horizon} revolutions"
-    return rows_table(title, rows, columns, "edges")
+    return table(title, rows, columns, "edges")
 
 
 def width_table(title: str, edges: Mapping[str, SolvedEdge], names: Sequence[str]) -> Table:
@@ -162,9 +139,9 @@ def width_table(title: str, edges: Mapping[str, SolvedEdge], names: Sequence[str
             row |= chosen(width, "width_rpm standard_error_rpm")
             row |= _with_errors({n: width.change(*of) for n, of in _asked(names).items()}, 0.01)
         rows.append(row)
-    columns = [Column("zone", (), key="name"), Column("width", (), key="width_rpm", errors="standard_error_rpm")]
-    columns += [*_error_columns(names, 1), Column("status", ())]
-    return rows_table(f"{title}, and what 1 % more of a parameter adds [rpm]", rows, columns, "widths")
+    width_column = Column("width", "width_rpm", error="standard_error_rpm")
+    columns = [Column("zone", "name"), width_column, *_error_columns(names, 1), "status"]
+    return table(f"{title}, and what 1 % more of a parameter adds [rpm]", rows, columns, "widths")
 
 
 def mean_gradient_tables(title: str, found: MeanGradient) -> list[Table]:
@@ -181,12 +158,11 @@ def mean_gradient_tables(title: str, found: MeanGradient) -> list[Table]:
         names = "unit value value_error drift drift_error settled explained"
         rows.append({"name": name, **chosen(each, names), "by": by})
         order = sorted(by, key=lambda n: -abs(by[n]["elasticity"])) if each.value else []
-        words = lambda direction: direction.replace("_", " ").replace("+", ", ")
-        moved += [{"statistic": name, "by": words(n)} | by[n] for n in order]
-    elasticity = Column("elasticity", (), errors="error")
-    columns = [Column("statistic", (), key="name"), Column("mean", (), key="value", errors="value_error")]
-    columns += [Column("unit", ()), Column("explained", (), "1", "%", digits=0), Column("settled", ())]
+        moved += [{"statistic": name, "by": n.replace("_", " ").replace("+", ", ")} | by[n] for n in order]
+    elasticities = ["statistic", "by", Column("elasticity", error="error")]
+    means = [Column("statistic", "name"), Column("mean", "value", error="value_error"), Column("SI unit", "unit")]
+    means += [Column("explained", shown="%", digits=0), "settled"]
     return [
-        rows_table(f"Elasticities, {title}", moved, [Column("statistic", ()), Column("by", ()), elasticity]),
-        rows_table(f"Means, {title}", rows, columns, "statistics"),
+        table(f"Elasticities, {title}", moved, elasticities),
+        table(f"Means, {title}", rows, means, "statistics"),
     ]
