@@ -27,7 +27,6 @@ from ..solve import (
     Lanes,
     March,
     NativeSteps,
-    codes_of,
     cores,
     errors_of_parts,
 )
@@ -210,7 +209,7 @@ class _Observer:
             numbers = self.lanes.numbers(engine, some[alive])
             seen = stop == end or (self.averages and begin >= run.discard)
             if begin == 0 or (self.averages and seen):
-                error[alive] = np.maximum(error[alive], self._error(plain, some[alive], state[alive], method))
+                error[alive] = np.maximum(error[alive], self._error(plain, some[alive], state[alive, None], method))
             strobes = (stop - begin) * samples
             held = strobes if self.averages else max(run.keep, min(CHECKED + 1, strobes))
             before, (_, begun) = state[alive], self.lanes.begin(some[alive], (state * units)[alive])
@@ -218,8 +217,8 @@ class _Observer:
                 numbers, before, strobes, held if seen else 1, method, step=step[alive], threads=cores(),
                 tangents=tangents[alive] if pushed and run.exponents else None, report=self._reporter(stop - begin),
             )  # fmt: skip
-            state[alive], step[alive], outcome[alive] = ran.state, ran.step, codes_of(ran.mark)
-            stuck[alive] = np.isin(ran.mark, (STUCK, TOO_MANY))
+            state[alive], step[alive], outcome[alive] = ran.state, ran.step, ran.outcome
+            stuck[alive] = np.isin(ran.outcome, (STUCK, TOO_MANY))
             if pushed and run.exponents:
                 tangents[alive] = ran.tangents
                 each = ran.growth.reshape(alive.size, stop - begin, samples, run.exponents).sum(axis=2)
@@ -240,7 +239,9 @@ class _Observer:
             strobe[alive] = ran.strobe[:, held - run.keep :]
             peak[alive] = np.maximum(ran.peak, begun)
             doubt[alive] = self._doubt(engine, numbers, ran, method)
-            error[alive] = np.maximum(error[alive], self._error_of_strobes(plain, some[alive], ran.strobe, method))
+            if held > 1:
+                last_ones = ran.strobe[:, -(CHECKED + 1) :]
+                error[alive] = np.maximum(error[alive], self._error(plain, some[alive], last_ones, method))
         blocks = growth.reshape(count, run.followed, run.block, run.exponents).mean(axis=2)
         last = np.where((outcome == 0)[:, None], state[:, :dim] * scale, np.nan)
         kept = strobe * scale[:, None, :]
@@ -274,38 +275,23 @@ class _Observer:
         self,
         engine: Engine | JaxEngine,
         some: Int[np.ndarray, " some"],
-        state: Float[np.ndarray, "some numbers"],
+        states: Float[np.ndarray, "some held numbers"],
         method: AbstractMethod,
     ) -> Float[np.ndarray, " some"]:
-        """Error of a stretch from a state: three times the distance of its end from that by the method's reference.
+        """Largest error of the stretches between states: three times the distance of the end of each from that by the
+        method's reference.
 
-        It is at least the tolerance, which protects against accidental agreement of the two. The stretch is a
-        revolution, or as much of one as two runs can be compared over.
+        It is at least the tolerance, which protects against accidental agreement of the two. A stretch is a revolution,
+        or as much of one as two runs can be compared over; of a single state it is the one that follows.
         """
-        turn, numbers = None, self.lanes.numbers(engine, some)
+        numbers, more = self.lanes.numbers(engine, some), {}
         if self.averages:
-            turn = np.array([self.model.comparable(speed) for speed in self.lanes.speed[some].tolist()])
-        ends = engine(numbers, state, 1, 1, method, turn=turn, threads=cores()).state
-        apart = errors_of_parts(engine, numbers, state, ends, self.model.dimension, method, turn=turn)
-        return np.maximum(np.nan_to_num(apart), getattr(method, "tolerance", 0.0))
-
-    def _error_of_strobes(
-        self,
-        engine: Engine | JaxEngine,
-        some: Int[np.ndarray, " some"],
-        strobe: Float[np.ndarray, "some held dim"],
-        method: AbstractMethod,
-    ) -> Float[np.ndarray, " some"]:
-        """The same of the last revolutions, whose strobe states are known."""
-        pairs = strobe[:, -(CHECKED + 1) :]
-        count = pairs.shape[1] - 1
-        if count < 1:
-            return np.zeros(len(strobe))
-        numbers = self.lanes.numbers(engine, np.repeat(some, count))
-        begins, ends = (x.reshape(-1, pairs.shape[2]) for x in (pairs[:, :-1], pairs[:, 1:]))
-        apart = errors_of_parts(engine, numbers, begins, ends, pairs.shape[2], method)
-        worst = np.max(np.nan_to_num(apart.reshape(-1, count)), axis=1)
-        return np.maximum(worst, getattr(method, "tolerance", 0.0))
+            more["turn"] = np.array([self.model.comparable(speed) for speed in self.lanes.speed[some].tolist()])
+        if states.shape[1] == 1:
+            ends = engine(numbers, states[:, 0], 1, 1, method, threads=cores(), **more).state
+            states = np.stack([states[:, 0], ends], axis=1)
+        apart = errors_of_parts(engine, numbers, states, self.model.dimension, method, **more)
+        return np.maximum(np.max(np.nan_to_num(apart), axis=1), getattr(method, "tolerance", 0.0))
 
 
 def centres_of(

@@ -12,6 +12,7 @@ import diffrax as dfx
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jaxtyping import Array, Int
 
 from .._pytrees import Form, Scalar, State, split
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, AbstractLinearisation
@@ -22,6 +23,8 @@ from .solvers import Rodas4, explicit_step, rosenbrock_step
 
 
 KernelSolver = Rodas4 | dfx.AbstractERK
+Parts = Int[Array, ""] | Scalar
+"""Number of equal parts of a revolution."""
 
 
 class Pieces(NamedTuple):
@@ -118,25 +121,15 @@ class KernelStep:
         return y, (jnp.maximum(peak, jnp.asarray(system.excursion(y))), *clock)  # the maximum keeps a NaN
 
 
-def kernel_step(
-    solver: KernelSolver, field: AbstractField, system: AbstractForcedSystem, scale: State
-) -> tuple[KernelStep, list[Any]]:
-    """A step and its fixed numbers behind phases and step size; system and scale have no derivative."""
-    watching = jax.tree.map(lambda x: jax.lax.stop_gradient(x) if eqx.is_array(x) else x, (system, scale))
-    structure, numbers = split((field, *watching), eqx.is_inexact_array)
-    abrupt = system.abrupt(scale, scale) is not None
-    return KernelStep(solver, structure, abrupt), numbers
-
-
 def steps_through(
-    solver: Any,
+    solver: KernelSolver,
     steps: Any,
     pieces: Pieces,
     y: State,
-    tangents: Sequence[State] = (),
-    drifts: Sequence[Sequence[Any] | None] = (),
-    phase: Any = 0.0,
-    parts: Any = 1,
+    tangents: Sequence[State],
+    drifts: Sequence[Sequence[Any] | None],
+    phase: Any,
+    parts: Parts,
 ) -> tuple[State, Scalar, tuple[State, ...]]:
     """One `parts`-th of a revolution of `steps` steps, and as many more as abrupt changes of the law ask for.
 
@@ -145,7 +138,11 @@ def steps_through(
 
     **Returns:** the state after it, the largest excursion on the way, the tangent vectors.
     """
-    step, numbers = kernel_step(solver, *pieces)
+    field, system, scale = pieces
+    # How far out a state is, and in which units, has no derivative.
+    watching = jax.tree.map(lambda x: jax.lax.stop_gradient(x) if eqx.is_array(x) else x, (system, scale))
+    structure, numbers = split((field, *watching), eqx.is_inexact_array)
+    step = KernelStep(solver, structure, system.abrupt(scale, scale) is not None)
     count, h = steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float)
     end = phase + REVOLUTION / jnp.asarray(parts, dtype=float)
     fixed = (jnp.asarray(phase, dtype=float), h, end, *numbers)

@@ -1,12 +1,13 @@
 """Inputs of the integration loop: methods, the programs of a model, and the rows of its working memory."""
 
 import dataclasses
+import itertools
 import math
 from typing import Any, NamedTuple
 
 import diffrax as dfx
 
-from .ir import Code, Value, is_variable, number
+from .ir import Code, Value, number
 
 
 REVOLUTION = 2 * math.pi
@@ -146,11 +147,9 @@ def layout_of(field: Field, stages: int) -> Layout:
 
 def fixed_numbers(w: Code, field: Field, rows: Layout, program: Any, first: int) -> list[Value]:
     """The fixed numbers of a program, which stand behind its first arguments; those that it does not read are 0."""
-    read = [*(v for e in program.jaxpr.eqns for v in e.invars), *program.jaxpr.outvars]
-    used = {v for v in read if is_variable(v)}
-    values, wide_row, shared = [], iter(rows["fixed"]), 0
-    for v, wide in zip(program.jaxpr.invars[first:], field.wide, strict=False):
-        row, at = next(wide_row) if wide else 0, shared
-        shared += not wide
-        values.append((w.get(row) if wide else w.shared(at)) if v in used else number(0.0))
+    used = set(program.needed)
+    values, wide_row, shared = [], iter(rows["fixed"]), itertools.count()
+    for k, wide in zip(range(first, len(program.jaxpr.invars)), field.wide, strict=False):
+        at = next(wide_row if wide else shared)
+        values.append((w.get(at) if wide else w.shared(at)) if k in used else number(0.0))
     return values

@@ -4,7 +4,8 @@ Each lane of a vector has a phase, a step size and a revolution of its own, and 
 or failed; the next lane of a queue, which all threads share, takes its place. Steps are controlled by the estimated
 error (PI controller), in units of the system's scale, and end near places where the law changes abruptly. At the end of
 a revolution the strobe state is stored, and tangent vectors are orthonormalised and their growth stored. What a lane
-does depends neither on its neighbours nor on the number of threads.
+does depends neither on its neighbours nor on the number of threads. The mark of a lane that leaves is the code of its
+outcome plus one.
 """
 
 from typing import Any
@@ -13,13 +14,9 @@ import numpy as np
 
 from .ir import Code, Value, is_variable, number
 from .layout import REVOLUTION, Field, Layout, Tableau, fixed_numbers, layout_of
+from .outcomes import FINISHED, NOT_FINITE, OUTSIDE, STUCK, TOO_MANY
+from .program import following
 from .step_control import Tried, limited_step, next_step, squared_error, step_to_strobe
-
-
-FINISHED, OUTSIDE, NOT_FINITE, STUCK, TOO_MANY, DIVERGED = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
-"""Marks of lanes that leave: all revolutions done; far outside what the model holds for; step size below the smallest
-one because the state is not finite, or because the error cannot be met; too many steps in a revolution; an iteration
-that did not converge, which this loop has none of."""
 
 
 def march_ir(field: Field, pair: str, width: int) -> str:
@@ -48,10 +45,7 @@ def _made(w: Code, field: Field, rows: Layout) -> list[Value]:
 def _made_wide(field: Field) -> list[bool]:
     """Which results of the prelude differ from lane to lane: those that follow from a number that does."""
     jaxpr = field.prelude.jaxpr
-    wide = {v for v, each in zip(jaxpr.invars, field.wide, strict=True) if each}
-    for e in jaxpr.eqns:
-        if any(is_variable(v) and v in wide for v in e.invars):
-            wide.update(e.outvars)
+    wide = following(jaxpr.eqns, [v for v, each in zip(jaxpr.invars, field.wide, strict=True) if each])
     return [is_variable(v) and v in wide for v in jaxpr.outvars]
 
 
@@ -198,7 +192,7 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     """Steps of a vector of lanes, one after the other, with their control."""
     w = Code(width)
     n, moving, stages, span = field.dimension, field.moving, len(tableau.phase), field.span
-    one, zero = number(1.0), number(0.0)
+    one, zero, marked = number(1.0), number(0.0), lambda code: number(code + 1.0)
     row = {name: rows[name][0] for name in rows.rows if len(rows[name]) > 0}
     at_stage = lambda i: row["rate"] + i * span
     vector = w.type("double", True)
@@ -295,12 +289,12 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     for k, x in enumerate(map(w.widened, watched)):
         peak = w.get(row["peak"] + k)
         w.put(row["peak"] + k, w.select(w.both(moves, w.compare("gt", x, peak)), x, peak))
-    mark = w.select(w.both(moves, w.compare("gt", w.widened(watched[0]), number(2.0))), number(OUTSIDE), mark)
+    mark = w.select(w.both(moves, w.compare("gt", w.widened(watched[0]), number(2.0))), marked(OUTSIDE), mark)
     refused = w.both(runs, w.negated(fine), w.compare("lt", proposed, smallest))
     finite = w.compare("lt", size, number(np.inf))
-    mark = w.select(refused, w.select(finite, number(STUCK), number(NOT_FINITE)), mark)
+    mark = w.select(refused, w.select(finite, marked(STUCK), marked(NOT_FINITE)), mark)
     mark = w.select(
-        w.both(runs, w.compare("gt", taken, w.mul(most, w.add(w.get(row["revolution"]), one)))), number(TOO_MANY), mark
+        w.both(runs, w.compare("gt", taken, w.mul(most, w.add(w.get(row["revolution"]), one)))), marked(TOO_MANY), mark
     )
     w.put(row["mark"], mark)
     w.line(f"br i1 {w.any(over).text}, label %over, label %check")
@@ -336,7 +330,7 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
 
         w.over(moving, (), renew)
     finished = w.both(over, w.compare("ge", revolution, total), w.compare("eq", mark, zero))
-    w.put(row["mark"], w.select(finished, number(FINISHED), mark))
+    w.put(row["mark"], w.select(finished, marked(FINISHED), mark))
     w.line("br label %check")
 
     w.line("check:")

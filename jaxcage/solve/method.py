@@ -2,7 +2,7 @@
 
 import abc
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import diffrax as dfx
@@ -12,17 +12,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Int
 
 from .._errors import ArgumentError
-from .._pytrees import Scalar, State
-from ..models import (
-    ESCAPE,
-    ScaledField,
-    divide,
-    multiply,
-)
-from .kernel import REVOLUTION, Pieces, can_be_kernel, steps_through
+from .._pytrees import Scalar, State, split
+from ..models import ESCAPE, ScaledField, divide, multiply
+from .kernel import REVOLUTION, Parts, Pieces, can_be_kernel, steps_through
 from .layout import PAIRS
 from .march import with_tangents
-from .outcomes import RESULTS, outcome_code
+from .outcomes import FINISHED, NOT_FINITE, OTHER, OUTCOMES, OUTSIDE, TOO_MANY
 from .solvers import ClassicalRK4, Rodas4
 
 
@@ -41,35 +36,18 @@ FINER = 16.0
 
 
 class Stretch(NamedTuple):
-    """A part of a revolution: where it ended, how far out it went on the way, and how it went."""
+    """A lane after a part of a revolution; or many, their axis last."""
 
     y: State
-    peak: Scalar
-    result: RESULTS
-
-
-Tangents = tuple[State, ...]
-
-
-class Moved(NamedTuple):
-    """A lane after a revolution; or many, their axis last."""
-
-    y: State
-    tangents: Tangents
     peak: Scalar
     """Largest excursion on the way."""
     outcome: Int[Array, "*lanes"]
+    """Place in `OUTCOMES`."""
+    tangents: tuple[State, ...]
 
 
-def moved_by(advance: Callable[[Any], Stretch], start: Any, tangents: Sequence[Any]) -> Moved:
-    """One lane moved by `advance` from its start, the tangent vectors there by the derivative of that."""
-
-    def move(start: Any) -> tuple[State, tuple[Any, ...]]:
-        stretch = advance(start)
-        return stretch.y, (jnp.asarray(stretch.peak, dtype=float), outcome_code(stretch.result))
-
-    y, after, (peak, code) = with_tangents(move, start, tangents)
-    return Moved(y, after, peak, code)
+Drift = Sequence[Any] | None
+"""Tangents of the numbers of a field, in the order of its leaves; None where there is none."""
 
 
 def _evaluate(tau: Any, y: Any, field: Any) -> State:
@@ -103,19 +81,23 @@ class AbstractMethod(eqx.Module):
         """The same with steps at most half as long, `times` over, for what it is to be confirmed by."""
 
     @abc.abstractmethod
-    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
-        """Go one `parts`-th of a revolution from state `y` at `phase`."""
+    def advance(
+        self,
+        pieces: Pieces,
+        y: State,
+        phase: Scalar,
+        parts: Parts,
+        tangents: Sequence[State] = (),
+        drifts: Sequence[Drift] = (),
+    ) -> Stretch:
+        """Go one `parts`-th of a revolution from state `y` at `phase`, with tangent vectors, and for each of them the
+        tangents of the field's numbers, by default none."""
 
 
-def result_at(result: Any, y: State, excursion: Scalar) -> RESULTS:
-    """The result of a state that a solver returned with one of diffrax's results."""
+def _outcome_at(y: State, excursion: Scalar) -> Int[Array, ""]:
+    """The outcome of an integration that came to a state."""
     finite = jnp.isfinite(sum(jnp.sum(jnp.abs(c)) for c in y))
-    state = RESULTS.where(excursion <= ESCAPE, RESULTS.successful, RESULTS.outside)  # pyright: ignore
-    state = RESULTS.where(finite, state, RESULTS.not_finite)  # pyright: ignore
-    if result is dfx.RESULTS.successful:  # what is known to be well is not promoted: that takes ten small programs
-        return state  # pyright: ignore
-    before = RESULTS.promote(result)
-    return RESULTS.where(before == RESULTS.successful, state, before)  # pyright: ignore
+    return jnp.where(finite, jnp.where(excursion <= ESCAPE, FINISHED, OUTSIDE), NOT_FINITE)
 
 
 class FixedSteps(AbstractMethod):
@@ -140,11 +122,19 @@ class FixedSteps(AbstractMethod):
         """With twice the steps, `times` over."""
         return FixedSteps(self.solver, self.steps << times)
 
-    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
+    def advance(
+        self,
+        pieces: Pieces,
+        y: State,
+        phase: Scalar,
+        parts: Parts,
+        tangents: Sequence[State] = (),
+        drifts: Sequence[Drift] = (),
+    ) -> Stretch:
         if isinstance(self.steps, int) and isinstance(parts, int) and self.steps % parts:
             raise ArgumentError("parts", said=f"must divide the {self.steps} steps per revolution, but it is {parts}.")
-        y, peak, _ = steps_through(self.solver, self.steps, pieces, y, phase=phase, parts=parts)
-        return Stretch(y, peak, result_at(dfx.RESULTS.successful, y, peak))
+        y, peak, after = steps_through(self.solver, self.steps, pieces, y, tangents, drifts, phase, parts)
+        return Stretch(y, peak, _outcome_at(y, peak), after)
 
 
 class AdaptiveSteps(AbstractMethod):
@@ -173,27 +163,50 @@ class AdaptiveSteps(AbstractMethod):
     def _with(self, factor: float) -> "AdaptiveSteps":
         return AdaptiveSteps(self.solver, factor * self.rtol, factor * self.atol, self.max_steps)
 
-    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
+    def advance(
+        self,
+        pieces: Pieces,
+        y: State,
+        phase: Scalar,
+        parts: Parts,
+        tangents: Sequence[State] = (),
+        drifts: Sequence[Drift] = (),
+    ) -> Stretch:
         field, system, scale = pieces
+        moving = any(drift is not None for drift in drifts)
+        form, row = split(field, lambda leaf: moving and eqx.is_inexact_array(leaf))
         length = REVOLUTION / jnp.asarray(parts, dtype=float)
-        solution = dfx.diffeqsolve(
-            TERM,
-            self.solver,
-            t0=phase,
-            t1=phase + length,
-            dt0=jnp.minimum(REVOLUTION / FIRST_STEPS, length),
-            y0=divide(y, scale),
-            args=ScaledField(field, scale),
-            stepsize_controller=dfx.PIDController(self.rtol, self.atol, pcoeff=0.3, icoeff=0.4),
-            saveat=dfx.SaveAt(t1=True),
-            adjoint=dfx.ForwardMode(),
-            max_steps=self.max_steps,
-            throw=False,
-        )
-        assert solution.ys is not None
-        y = multiply(tuple(c[-1] for c in solution.ys), scale)
-        excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y), dtype=float))
-        return Stretch(y, excursion, result_at(solution.result, y, excursion))
+
+        def move(start: tuple[State, list[Array]]) -> tuple[State, tuple[Array, Array]]:
+            y, row = start
+            solution = dfx.diffeqsolve(
+                TERM,
+                self.solver,
+                t0=phase,
+                t1=phase + length,
+                dt0=jnp.minimum(REVOLUTION / FIRST_STEPS, length),
+                y0=divide(y, scale),
+                args=ScaledField(form.filled(row), scale),
+                stepsize_controller=dfx.PIDController(self.rtol, self.atol, pcoeff=0.3, icoeff=0.4),
+                saveat=dfx.SaveAt(t1=True),
+                adjoint=dfx.ForwardMode(),
+                max_steps=self.max_steps,
+                throw=False,
+            )
+            assert solution.ys is not None
+            y = multiply(tuple(c[-1] for c in solution.ys), scale)
+            excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y), dtype=float))
+            failed = jnp.full((), OTHER)
+            for name in OUTCOMES[TOO_MANY:OTHER]:
+                failed = jnp.where(solution.result == getattr(dfx.RESULTS, name), OUTCOMES.index(name), failed)
+            well = solution.result == dfx.RESULTS.successful
+            return y, (excursion, jnp.where(well, _outcome_at(y, excursion), failed))
+
+        zero = list(map(jnp.zeros_like, row))
+        filled = lambda drift: [z if d is None else d for z, d in zip(zero, drift or zero, strict=True)]
+        along = list(zip(tangents, map(filled, drifts or [None] * len(tangents)), strict=True))
+        end, after, (peak, outcome) = with_tangents(move, (y, row), along)
+        return Stretch(end, peak, outcome, after)
 
 
 class NativeSteps(AbstractMethod):
@@ -226,8 +239,8 @@ class NativeSteps(AbstractMethod):
         """The same by the implicit method, for stiff laws."""
         return NativeSteps(self.tolerance, self.error, IMPLICIT)
 
-    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
-        return self.in_jax.advance(pieces, y, phase, parts)
+    def advance(self, *args: Any, **kwargs: Any) -> Stretch:
+        return self.in_jax.advance(*args, **kwargs)
 
     def finer(self, times: int = 1) -> "NativeSteps":
         """The same with tolerances 16 times smaller, `times` over."""

@@ -47,8 +47,12 @@ class Program(NamedTuple):
 
     jaxpr: Any
     consts: Any
-    needed: list[int]
-    """Which of its arguments it uses."""
+
+    @property
+    def needed(self) -> list[int]:
+        """Which of its arguments it uses."""
+        read = _variables(self.jaxpr.outvars).union(*map(_read, self.jaxpr.eqns))
+        return [i for i, v in enumerate(self.jaxpr.invars) if v in read]
 
     def __call__(self, *x: Any) -> list[Any]:
         return eval_jaxpr(self.jaxpr, self.consts, *x)
@@ -81,10 +85,7 @@ def _written_out(step: Step, sizes: Sizes, rules: bool) -> Program:
     once = functools.partial(_inlined, traced.jaxpr, traced.consts, seen={}, rules=rules)
     traced = jax.make_jaxpr(once)(*_arguments(sizes))
     jaxpr = traced.jaxpr
-    equations = _needed(jaxpr.eqns, jaxpr.outvars)
-    jaxpr = jaxpr.replace(eqns=equations)
-    read = _variables(jaxpr.outvars).union(*map(_read, equations))
-    return Program(jaxpr, traced.consts, [i for i, v in enumerate(jaxpr.invars) if v in read])
+    return Program(jaxpr.replace(eqns=needed(jaxpr.eqns, jaxpr.outvars)), traced.consts)
 
 
 _traced = functools.lru_cache(maxsize=128)(_trace)
@@ -113,7 +114,16 @@ def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any]
     return [read(v) for v in jaxpr.outvars]
 
 
-def _needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
+def following(equations: Sequence[Any], given: Sequence[Any]) -> set[Any]:
+    """The variables given, and those that follow from any of them."""
+    found = set(given)
+    for e in equations:
+        if found & _variables(e.invars):
+            found.update(e.outvars)
+    return found
+
+
+def needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
     """Those of the equations that what is wanted follows from, in their order."""
     reached = _variables(wanted)
     kept = []

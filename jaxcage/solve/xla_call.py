@@ -79,7 +79,7 @@ done:
   ret void
 }}
 """
-"""XLA's function: it answers what XLA asks of it once (extension 1: its version), and calls `march(inputs, outputs)`."""
+"""XLA's function: it answers what XLA asks once (extension 1: its version), and calls `march(inputs, outputs)`."""
 
 
 def handler_ir(inputs: int, outputs: int) -> str:
