@@ -93,7 +93,7 @@ EVEN = even(MODEL)
 def by_lanes(chosen, directions=()):
     @compiled
     def run(model, speed, y, tangents):
-        one = lambda s, y, t: strobe_map(model, s, chosen)(y, t)
+        one = lambda s, y, t: strobe_map(model, s, chosen)(y, [(one, None) for one in t])
         return jax.vmap(one)(speed, y, tangents)
 
     tangents = tuple(lane_state(np.broadcast_to(d, STATES.shape)) for d in directions)

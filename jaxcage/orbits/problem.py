@@ -131,7 +131,7 @@ class OrbitProblem(eqx.Module):
 
         def once(_: Array, carry: tuple) -> tuple:
             y, tangents = carry
-            moved = strobe(y, tangents, along)
+            moved = strobe(y, list(zip(tangents, along, strict=True)))
             return moved.y, moved.tangents
 
         y, tangents = jax.lax.fori_loop(0, self.periods, once, start)

@@ -357,7 +357,7 @@ def histories(
 def errors_of_parts(
     engine: Engine | JaxEngine,
     numbers: Any,
-    states: Float[np.ndarray, "lanes parts+1 numbers"],
+    states: Float[np.ndarray, "lanes states numbers"],
     dimension: int,
     method: AbstractMethod,
     **more: Any,

@@ -24,7 +24,7 @@ from ..models import (
     multiply,
 )
 from .ir import Code, UnknownOperation, Value, is_variable, number
-from .layout import Field, Layout, fixed_numbers
+from .layout import Field, Layout, fixed_numbers, rates_arguments
 from .program import Program, Sizes, following, needed, program_of
 from .solvers import rosenbrock_step
 
@@ -178,7 +178,7 @@ class RollersCode(NamedTuple):
         load = lambda first, count: [w.get(first + k, base="%place") for k in range(count)]
         own = [load(z * OF_ROLLER + size * t, OF_BODIES) for t in range(1 + tangents)]
         phase = w.get(size * (1 + tangents), base="%place")
-        (cos, sin), w.block = w.program(self.angle, [number(0.0), phase], w.block)
+        cos, sin = w.program(self.angle, [number(0.0), phase])
         places = 2 * np.pi / z * np.arange(z)
         table = ", ".join(f"double {number(x).text}" for pair in zip(np.cos(places), np.sin(places)) for x in pair)
         # Of values and of tangents MOVING sums each, then the other sums, then the largest force and slip.
@@ -200,7 +200,7 @@ class RollersCode(NamedTuple):
             numbers += [w.get(row(size * t + k), base="%place") for k in range(OF_ROLLER)] + own[t]
         arguments = [number(0.0), *place, cos, sin, *numbers]
         fixed = fixed_numbers(w, field, rows, self.roller, len(arguments))
-        results, w.block = w.program(self.roller, [*arguments, *fixed], w.block)
+        results = w.program(self.roller, [*arguments, *fixed])
         rates, passed = [], []
         for t in range(1 + tangents):
             part = results[t * (OF_ROLLER + MOVING) : (t + 1) * (OF_ROLLER + MOVING)]
@@ -233,18 +233,14 @@ class RollersCode(NamedTuple):
             numbers += own[t] + new[t * MOVING : (t + 1) * MOVING]
         arguments = [number(0.0), cos, sin, *numbers, *new[moving:]]
         fixed = fixed_numbers(w, field, rows, self.bodies, len(arguments))
-        results, w.block = w.program(self.bodies, [*arguments, *fixed], w.block)
+        results = w.program(self.bodies, [*arguments, *fixed])
         for t in range(1 + tangents):
             for k in range(OF_BODIES):
                 w.put(size * t + z * OF_ROLLER + k, results[t * OF_BODIES + k], base="%out")
         for k, x in enumerate(results[(1 + tangents) * OF_BODIES :]):
             w.put(size * (1 + tangents) + k, x, base="%out")
-        head = (
-            f"@places = internal constant [{2 * z} x double] [{table}]\n"
-            f"define internal void @rates({vector} %phase, ptr noalias %place, ptr noalias %memory, "
-            "ptr noalias %shared, ptr noalias %out) noinline {\nentry:\n"
-        )
-        return head + w.taken() + "\n  ret void\n}\n", w.declarations
+        text, declarations = w.function("rates", rates_arguments(w))
+        return f"@places = internal constant [{2 * z} x double] [{table}]\n{text}", declarations
 
 
 def bearing_field(form: Form, wide: tuple[bool, ...], dimension: int, tangents: int) -> Field:

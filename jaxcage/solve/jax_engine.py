@@ -44,7 +44,7 @@ def _strobe(
         scale = system.scale(speed)
         state, row = lambda z: multiply(tuple(z), scale), lambda z: jnp.stack(divide(z, scale))
         strobe = StrobeMap(system.at_speed(speed), system, scale, method)
-        moved = strobe.part(state(y), i, samples, [state(t) for t in tangents])
+        moved = strobe.part(state(y), i, samples, [(state(t), None) for t in tangents])
         after = jnp.stack([row(t) for t in moved.tangents]) if moved.tangents else tangents
         return row(moved.y), after, jnp.asarray(moved.peak, dtype=float), moved.outcome
 

@@ -25,6 +25,9 @@ from .solvers import Rodas4, explicit_step, rosenbrock_step
 KernelSolver = Rodas4 | dfx.AbstractERK
 Parts = Int[Array, ""] | Scalar
 """Number of equal parts of a revolution."""
+Tangents = Sequence[tuple[State, Sequence[Any] | None]]
+"""Tangent vectors in units of the state, each with the tangents of the field's numbers in the order of its leaves, None
+where there are none."""
 
 
 class Pieces(NamedTuple):
@@ -122,19 +125,9 @@ class KernelStep:
 
 
 def steps_through(
-    solver: KernelSolver,
-    steps: Any,
-    pieces: Pieces,
-    y: State,
-    tangents: Sequence[State],
-    drifts: Sequence[Sequence[Any] | None],
-    phase: Any,
-    parts: Parts,
+    solver: Any, steps: Any, pieces: Pieces, y: State, phase: Any, parts: Parts, tangents: Tangents
 ) -> tuple[State, Scalar, tuple[State, ...]]:
     """One `parts`-th of a revolution of `steps` steps, and as many more as abrupt changes of the law ask for.
-
-    **Arguments:** solver; steps of a revolution; what is integrated; state; tangent vectors, and for each of
-    them the tangents of the field's numbers, None where there are none; phase and part.
 
     **Returns:** the state after it, the largest excursion on the way, the tangent vectors.
     """
@@ -147,13 +140,13 @@ def steps_through(
     end = phase + REVOLUTION / jnp.asarray(parts, dtype=float)
     fixed = (jnp.asarray(phase, dtype=float), h, end, *numbers)
     row = lambda drift: (None, None, None, *(drift or ()), *(None,) * (len(numbers) - len(drift or ())))
-    along = [row(d) for d in drifts]
+    along = [row(drift) for _, drift in tangents]
 
     def go(carry: tuple, count: Any) -> tuple:
         y, watched, tangents = carry
         return march_with_tangents(step, count, y, watched, fixed, tangents, along)
 
-    carry = go((tuple(y), step.watched(phase), tuple(tangents)), count)
+    carry = go((tuple(y), step.watched(phase), tuple(t for t, _ in tangents)), count)
     if step.abrupt:
         more = jnp.maximum(count // MORE, 1)
         # A lane that is lost ends the loop: it is far out, or its phase is NaN.

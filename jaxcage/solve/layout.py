@@ -153,3 +153,9 @@ def fixed_numbers(w: Code, field: Field, rows: Layout, program: Any, first: int)
         at = next(wide_row if wide else shared)
         values.append((w.get(at) if wide else w.shared(at)) if k in used else number(0.0))
     return values
+
+
+def rates_arguments(w: Code) -> str:
+    """Arguments of the function of rates."""
+    phase, places = f"{w.type('double', True)} %phase", ("place", "memory", "shared", "out")
+    return ", ".join([phase, *(f"ptr noalias %{name}" for name in places)])

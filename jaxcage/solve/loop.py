@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .ir import Code, Value, is_variable, number
-from .layout import REVOLUTION, Field, Layout, Tableau, fixed_numbers, layout_of
+from .layout import REVOLUTION, Field, Layout, Tableau, fixed_numbers, layout_of, rates_arguments
 from .outcomes import FINISHED, NOT_FINITE, OUTSIDE, STUCK, TOO_MANY
 from .program import following
 from .step_control import Tried, limited_step, next_step, squared_error, step_to_strobe
@@ -37,11 +37,6 @@ def march_ir(field: Field, pair: str, width: int) -> str:
     return "\n".join([*(text for text, _ in parts), *declarations, '!0 = !{!"branch_weights", i32 1, i32 30}', ""])
 
 
-def _made(w: Code, field: Field, rows: Layout) -> list[Value]:
-    """Results of the prelude."""
-    return [w.get(row, wide) for row, wide in zip(rows["made"], _made_wide(field), strict=True)]
-
-
 def _made_wide(field: Field) -> list[bool]:
     """Which results of the prelude differ from lane to lane: those that follow from a number that does."""
     jaxpr = field.prelude.jaxpr
@@ -52,11 +47,10 @@ def _made_wide(field: Field) -> list[bool]:
 def _prelude(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
     """The code that works out everything that follows from the fixed numbers alone."""
     w = Code(width)
-    results, _ = w.program(field.prelude, fixed_numbers(w, field, rows, field.prelude, 0), "entry")
+    results = w.program(field.prelude, fixed_numbers(w, field, rows, field.prelude, 0))
     for row, wide, v in zip(rows["made"], _made_wide(field), results, strict=True):
         w.put(row, v, wide)
-    head = "define internal void @prelude(ptr noalias %memory, ptr noalias %shared) noinline {\nentry:\n"
-    return head + w.taken() + "\n  ret void\n}\n", w.declarations
+    return w.function("prelude", "ptr noalias %memory, ptr noalias %shared")
 
 
 def _rates(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
@@ -65,14 +59,11 @@ def _rates(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
     moved = [w.get(j, base="%place") for j in range(field.moving)]
     arguments = [Value("%phase", "double", True), *moved]
     fixed = fixed_numbers(w, field, rows, field.rates, len(arguments))
-    results, _ = w.program(field.rates, [*arguments, *fixed, *_made(w, field, rows)], "entry")
+    made = [w.get(row, wide) for row, wide in zip(rows["made"], _made_wide(field), strict=True)]
+    results = w.program(field.rates, [*arguments, *fixed, *made])
     for j, v in enumerate(results):
         w.put(j, v, base="%out")
-    head = (
-        f"define internal void @rates({w.type('double', True)} %phase, ptr noalias %place, ptr noalias %memory, "
-        "ptr noalias %shared, ptr noalias %out) noinline {\nentry:\n"
-    )
-    return head + w.taken() + "\n  ret void\n}\n", w.declarations
+    return w.function("rates", rates_arguments(w))
 
 
 def _implicit(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
@@ -81,19 +72,13 @@ def _implicit(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
     assert field.step is not None
     moved = w.all(rows["state"])
     arguments = [Value("%phase", "double", True), Value("%step", "double", True), *moved]
-    results, _ = w.program(
-        field.step, [*arguments, *fixed_numbers(w, field, rows, field.step, len(arguments))], "entry"
-    )
+    results = w.program(field.step, [*arguments, *fixed_numbers(w, field, rows, field.step, len(arguments))])
     for j, v in enumerate(results[: field.moving]):
         w.put(rows["stage"][0] + j, v)
     for j, v in enumerate(results[field.moving :]):
         w.put(rows["again"][0] + j, v)
     vector = w.type("double", True)
-    head = (
-        f"define internal void @implicit({vector} %phase, {vector} %step, ptr noalias %memory, ptr noalias %shared) "
-        "noinline {\nentry:\n"
-    )
-    return head + w.taken() + "\n  ret void\n}\n", w.declarations
+    return w.function("implicit", f"{vector} %phase, {vector} %step, ptr noalias %memory, ptr noalias %shared")
 
 
 REFILL = """define internal i1 @refill(ptr %memory, ptr %queue, i64 %lanes, ptr %loaded, ptr %stored) noinline {{
@@ -283,7 +268,7 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     (size,) = w.over(moving, [zero], accept)
     if field.excursion is not None:
         new = w.all(range(row["stage"], row["stage"] + n))
-        watched, w.block = w.program(field.excursion, arguments(field.excursion, [zero, *new]), w.block)
+        watched = w.program(field.excursion, arguments(field.excursion, [zero, *new]))
     else:
         watched = [w.get(at_stage(stages - 1) + moving + k) for k in range(field.watched)]
     for k, x in enumerate(map(w.widened, watched)):

@@ -2,7 +2,6 @@
 
 import abc
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import diffrax as dfx
@@ -14,7 +13,7 @@ from jaxtyping import Array, Int
 from .._errors import ArgumentError
 from .._pytrees import Scalar, State, split
 from ..models import ESCAPE, ScaledField, divide, multiply
-from .kernel import REVOLUTION, Parts, Pieces, can_be_kernel, steps_through
+from .kernel import REVOLUTION, Parts, Pieces, Tangents, can_be_kernel, steps_through
 from .layout import PAIRS
 from .march import with_tangents
 from .outcomes import FINISHED, NOT_FINITE, OTHER, OUTCOMES, OUTSIDE, TOO_MANY
@@ -44,10 +43,6 @@ class Stretch(NamedTuple):
     outcome: Int[Array, "*lanes"]
     """Place in `OUTCOMES`."""
     tangents: tuple[State, ...]
-
-
-Drift = Sequence[Any] | None
-"""Tangents of the numbers of a field, in the order of its leaves; None where there is none."""
 
 
 def _evaluate(tau: Any, y: Any, field: Any) -> State:
@@ -81,17 +76,8 @@ class AbstractMethod(eqx.Module):
         """The same with steps at most half as long, `times` over, for what it is to be confirmed by."""
 
     @abc.abstractmethod
-    def advance(
-        self,
-        pieces: Pieces,
-        y: State,
-        phase: Scalar,
-        parts: Parts,
-        tangents: Sequence[State] = (),
-        drifts: Sequence[Drift] = (),
-    ) -> Stretch:
-        """Go one `parts`-th of a revolution from state `y` at `phase`, with tangent vectors, and for each of them the
-        tangents of the field's numbers, by default none."""
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Parts, tangents: Tangents = ()) -> Stretch:
+        """Go one `parts`-th of a revolution from state `y` at `phase`, with tangent vectors."""
 
 
 def _outcome_at(y: State, excursion: Scalar) -> Int[Array, ""]:
@@ -122,18 +108,10 @@ class FixedSteps(AbstractMethod):
         """With twice the steps, `times` over."""
         return FixedSteps(self.solver, self.steps << times)
 
-    def advance(
-        self,
-        pieces: Pieces,
-        y: State,
-        phase: Scalar,
-        parts: Parts,
-        tangents: Sequence[State] = (),
-        drifts: Sequence[Drift] = (),
-    ) -> Stretch:
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Parts, tangents: Tangents = ()) -> Stretch:
         if isinstance(self.steps, int) and isinstance(parts, int) and self.steps % parts:
             raise ArgumentError("parts", said=f"must divide the {self.steps} steps per revolution, but it is {parts}.")
-        y, peak, after = steps_through(self.solver, self.steps, pieces, y, tangents, drifts, phase, parts)
+        y, peak, after = steps_through(self.solver, self.steps, pieces, y, phase, parts, tangents)
         return Stretch(y, peak, _outcome_at(y, peak), after)
 
 
@@ -163,17 +141,9 @@ class AdaptiveSteps(AbstractMethod):
     def _with(self, factor: float) -> "AdaptiveSteps":
         return AdaptiveSteps(self.solver, factor * self.rtol, factor * self.atol, self.max_steps)
 
-    def advance(
-        self,
-        pieces: Pieces,
-        y: State,
-        phase: Scalar,
-        parts: Parts,
-        tangents: Sequence[State] = (),
-        drifts: Sequence[Drift] = (),
-    ) -> Stretch:
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Parts, tangents: Tangents = ()) -> Stretch:
         field, system, scale = pieces
-        moving = any(drift is not None for drift in drifts)
+        moving = any(drift is not None for _, drift in tangents)
         form, row = split(field, lambda leaf: moving and eqx.is_inexact_array(leaf))
         length = REVOLUTION / jnp.asarray(parts, dtype=float)
 
@@ -204,8 +174,7 @@ class AdaptiveSteps(AbstractMethod):
 
         zero = list(map(jnp.zeros_like, row))
         filled = lambda drift: [z if d is None else d for z, d in zip(zero, drift or zero, strict=True)]
-        along = list(zip(tangents, map(filled, drifts or [None] * len(tangents)), strict=True))
-        end, after, (peak, outcome) = with_tangents(move, (y, row), along)
+        end, after, (peak, outcome) = with_tangents(move, (y, row), [(t, filled(drift)) for t, drift in tangents])
         return Stretch(end, peak, outcome, after)
 
 

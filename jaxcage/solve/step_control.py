@@ -44,7 +44,7 @@ def limited_step(w: Code, field: Field, rows: Layout, phase: Callable[[], Value]
     near = w.all([*range(state, state + n), *range(rate, rate + n)])
     leading = [phase(), *near]
     arguments = [*leading, *fixed_numbers(w, field, rows, field.abrupt, len(leading))]
-    (distance, speed), w.block = w.program(field.abrupt, arguments, w.block)
+    distance, speed = w.program(field.abrupt, arguments)
     time = w.larger(w.div(distance, w.add(speed, number(1e-9))), number(NEAREST))
     return w.smaller(w.widened(time), step)
 

@@ -4,8 +4,6 @@ Simulation, sweeps, exponents, orbits and gradients all advance through it, so t
 once. It is differentiable (forward mode) with respect to state, speed and every parameter of the system.
 """
 
-from collections.abc import Sequence
-
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Int
@@ -13,8 +11,8 @@ from jaxtyping import Array, Int
 from .._arguments import require_x64
 from .._pytrees import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem, require_speeds
-from .kernel import REVOLUTION, Parts, Pieces
-from .method import AbstractMethod, Drift, Stretch, method as method_of
+from .kernel import REVOLUTION, Parts, Pieces, Tangents
+from .method import AbstractMethod, Stretch, method as method_of
 
 
 class StrobeMap(eqx.Module):
@@ -25,26 +23,18 @@ class StrobeMap(eqx.Module):
     scale: State
     method: AbstractMethod
 
-    def __call__(self, y: State, tangents: Sequence[State] = (), drifts: Sequence[Drift] = ()) -> Stretch:
+    def __call__(self, y: State, tangents: Tangents = ()) -> Stretch:
         """One revolution from `y`: state after it, largest excursion on the way, outcome, tangent vectors.
 
-        **Arguments:** state; tangent vectors in units of the state, and for each of them the tangents of the field's
-        numbers along which the field changes too, by default none.
+        **Arguments:** state; tangent vectors in units of the state, each with the tangents of the field's numbers along
+        which the field changes too, or None.
         """
-        return self.part(y, 0, 1, tangents, drifts)
+        return self.part(y, 0, 1, tangents)
 
-    def part(
-        self,
-        y: State,
-        i: Int[Array, ""] | int,
-        parts: Parts,
-        tangents: Sequence[State] = (),
-        drifts: Sequence[Drift] = (),
-    ) -> Stretch:
+    def part(self, y: State, i: Int[Array, ""] | int, parts: Parts, tangents: Tangents = ()) -> Stretch:
         """The `i`-th of `parts` equal parts of a revolution."""
         phase = jnp.asarray(i, dtype=float) * (REVOLUTION / jnp.asarray(parts, dtype=float))
-        pieces = Pieces(self.field, self.system, self.scale)
-        return self.method.advance(pieces, y, phase, parts, tangents, drifts)
+        return self.method.advance(Pieces(self.field, self.system, self.scale), y, phase, parts, tangents)
 
 
 def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod | None = None) -> StrobeMap:
