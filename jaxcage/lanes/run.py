@@ -10,7 +10,7 @@ from jaxtyping import Float
 from .._arguments import require_x64
 from ..analysis import label_lanes, motion_label
 from ..models import INSTEAD, AbstractForcedSystem, require_known
-from ..solve import FINISHED, INACCURATE, AbstractMethod
+from ..solve import FINISHED, INACCURATE
 from .confirm import Labelled, confirm
 from .dataset import dataset, exponent_error
 from .horizon import follow, run_unsettled
@@ -65,17 +65,8 @@ def sweep(
     speeds: Speeds,
     *,
     starts: States = None,
-    discard: int | None = None,
-    revolutions: int | None = None,
-    blocks: int | None = None,
-    exponents: int | None = None,
-    keep: int | None = None,
-    confirm: bool | None = None,
-    horizon: int | None = None,
-    settled: int | None = None,
-    tolerance: float | None = None,
-    method: AbstractMethod | None = None,
     progress: Progress | None = None,
+    **settings: Any,
 ) -> xr.Dataset:
     """Run a model over speed from several initial states: strobe states, Lyapunov exponents, labels; of a whole bearing
     slips, forces, losses and wear.
@@ -87,9 +78,9 @@ def sweep(
         from revolutions per minute.
     - `starts`: initial states, each a tuple of numbers, or an array with states of its own for each speed; or how many
         of the model's own; by default all of these.
-    - `tolerance`: of machine code, relative to state and scale; `method`: any integration method instead.
-    - the rest: fields of `jaxcage.lanes.Run`, which names their defaults.
     - `progress`: called with lanes done and lanes in all.
+    - `settings`: fields of `jaxcage.lanes.Run`, which names their defaults, such as `discard`, `revolutions`, `blocks`,
+        `exponents`, `confirm`, `horizon` and `method`; or the `tolerance` of machine code, relative to state and scale.
 
     **Returns:** a data set over `speed` and `start` (of several designs over `design` too), with the labels, exponents
     and quantities of every lane. Lanes that fail are NaN with an outcome.
@@ -100,17 +91,4 @@ def sweep(
     require_x64()
     require_known("sweep", INSTEAD, model, speeds)
     plan = Plan.over_speed(model, speeds, starts)
-    run = Run.of(
-        plan.model,
-        discard=discard,
-        revolutions=revolutions,
-        blocks=blocks,
-        exponents=exponents,
-        keep=keep,
-        confirm=confirm,
-        horizon=horizon,
-        settled=settled,
-        tolerance=tolerance,
-        method=method,
-    )
-    return run_lanes(plan, run, progress)
+    return run_lanes(plan, Run.of(plan.model, **settings), progress)

@@ -127,7 +127,7 @@ class Engine:
         n, moving = field.dimension, field.moving
         limits, more = self._limits, max(1.0, MOST_AT / method.tolerance) ** (1 / self._order)
         most = limits.most * float(np.max(numbers.slow)) * more
-        loaded = np.zeros((rows.end("fixed"), lanes))
+        loaded = np.zeros((rows.end("first_step"), lanes))
         loaded[:n], loaded[moving - field.beside : moving] = state[:, :n].T, state[:, n:].T
         if field.tangents:
             assert tangents is not None
@@ -135,7 +135,7 @@ class Engine:
         given = np.broadcast_to(np.nan if step is None else step, lanes)
         loaded[rows["step"][0]] = np.where(np.isnan(given), limits.first, given)
         loaded[rows["peak"]] = 0.0 if field.excursion is not None else -np.inf
-        wide = loaded[rows.end("mark") :]
+        wide = loaded[rows.end("mark") : rows.end("fixed")]
         if field.own_turn:
             wide[0], wide[1] = REVOLUTION / self._samples if turn is None else turn, begin
         wide[SAMPLED * field.own_turn :] = numbers.wide

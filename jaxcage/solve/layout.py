@@ -124,8 +124,8 @@ class Field(NamedTuple):
 
 
 def layout_of(field: Field, stages: int) -> Layout:
-    """Rows of the working memory: those that are stored when a lane leaves come first, then those that are loaded with
-    it, then those that are set to zero."""
+    """Rows of the working memory: those that are stored when a lane leaves come first, then others that are loaded with
+    the next one, from `fixed` to `first_step`."""
     return Layout.of(
         state=field.moving,
         step=1,

@@ -32,7 +32,9 @@ def march_ir(field: Field, pair: str, width: int) -> str:
     made = [_prelude(field, rows, width)] if field.prelude else []
     rates = field.rates.code(field, rows, width) if hasattr(field.rates, "code") else _rates(field, rows, width)
     implicit = [_implicit(field, rows, width)] if tableau.implicit else []
-    parts = [*made, rates, *implicit, _refill(rows, width), _loop(field, rows, tableau, width)]
+    first = {"mark": rows["mark"][0] * width, "lane": rows["lane"][0] * width}
+    refill = REFILL.format(width=width, n_stored=rows.end("mark"), n_loaded=rows.end("first_step"), **first)
+    parts = [*made, rates, *implicit, (refill, set()), _loop(field, rows, tableau, width)]
     declarations = sorted(set().union(*(declared for _, declared in parts)))
     return "\n".join([*(text for text, _ in parts), *declarations, '!0 = !{!"branch_weights", i32 1, i32 30}', ""])
 
@@ -132,15 +134,7 @@ load:
   store double %given, ptr %out
   %s_next = add i64 %s, 1
   %rest = icmp slt i64 %s_next, {n_loaded}
-  br i1 %rest, label %load, label %zero
-zero:
-  %z = phi i64 [ {n_loaded}, %load ], [ %z_next, %zero ]
-  %zero_row = mul i64 %z, {width}
-  %zero_at = getelementptr double, ptr %column, i64 %zero_row
-  store double 0.0, ptr %zero_at
-  %z_next = add i64 %z, 1
-  %zeros = icmp slt i64 %z_next, {n_zero}
-  br i1 %zeros, label %zero, label %begin
+  br i1 %rest, label %load, label %begin
 begin:
   %number = sitofp i64 %new to double
   store double %number, ptr %place_at
@@ -160,17 +154,6 @@ return:
 }}
 """
 """This function stores lanes that have left and loads lanes of the queue. Its result is true if any lane is left."""
-
-
-def _refill(rows: Layout, width: int) -> tuple[str, set[str]]:
-    return REFILL.format(
-        width=width,
-        mark=rows["mark"][0] * width,
-        lane=rows["lane"][0] * width,
-        n_stored=rows.end("mark"),
-        n_loaded=rows.end("fixed"),
-        n_zero=rows.end("first_step"),
-    ), set()
 
 
 def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str, set[str]]:

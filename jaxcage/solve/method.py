@@ -20,8 +20,8 @@ from .outcomes import FINISHED, NOT_FINITE, OTHER, OUTCOMES, OUTSIDE, TOO_MANY
 from .solvers import ClassicalRK4, Rodas4
 
 
-FIRST_STEPS = 64
-"""The first of adaptive steps is a revolution over so many."""
+FIRST_STEPS, MOST_STEPS = 64, 100_000
+"""The first of adaptive steps is a revolution over so many; and the most of them."""
 SHARPER = 1e-2
 """Tolerance of the run that measures errors, as a fraction of the tolerance."""
 DEFAULT_TOLERANCE = 1e-6
@@ -73,7 +73,7 @@ class AbstractMethod(eqx.Module):
 
     @abc.abstractmethod
     def finer(self, times: int = 1) -> "AbstractMethod":
-        """The same with steps at most half as long, `times` over, for what it is to be confirmed by."""
+        """The same with steps half as long, or tolerances `FINER` times smaller, `times` over, to confirm it by."""
 
     @abc.abstractmethod
     def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Parts, tangents: Tangents = ()) -> Stretch:
@@ -105,7 +105,6 @@ class FixedSteps(AbstractMethod):
         return self.finer()
 
     def finer(self, times: int = 1) -> "FixedSteps":
-        """With twice the steps, `times` over."""
         return FixedSteps(self.solver, self.steps << times)
 
     def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Parts, tangents: Tangents = ()) -> Stretch:
@@ -121,25 +120,15 @@ class AdaptiveSteps(AbstractMethod):
     The largest excursion is that of the ends of revolutions, or of their parts."""
 
     solver: dfx.AbstractAdaptiveSolver
-    rtol: float = eqx.field(static=True, default=1e-6)
-    atol: float = eqx.field(static=True, default=1e-6)
-    max_steps: int = eqx.field(static=True, default=100_000)
-
-    @property
-    def tolerance(self) -> float:
-        """Lower bound of a measured error."""
-        return self.atol
+    tolerance: float = eqx.field(static=True)
+    """Of the error estimate, relative to the state and to the system's scale; and a lower bound of a measured error."""
 
     @property
     def reference(self) -> "AdaptiveSteps":
-        return self._with(SHARPER)
+        return AdaptiveSteps(self.solver, SHARPER * self.tolerance)
 
     def finer(self, times: int = 1) -> "AdaptiveSteps":
-        """With tolerances 16 times smaller, `times` over."""
-        return self._with(16.0**-times)
-
-    def _with(self, factor: float) -> "AdaptiveSteps":
-        return AdaptiveSteps(self.solver, factor * self.rtol, factor * self.atol, self.max_steps)
+        return AdaptiveSteps(self.solver, FINER**-times * self.tolerance)
 
     def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Parts, tangents: Tangents = ()) -> Stretch:
         field, system, scale = pieces
@@ -157,10 +146,10 @@ class AdaptiveSteps(AbstractMethod):
                 dt0=jnp.minimum(REVOLUTION / FIRST_STEPS, length),
                 y0=divide(y, scale),
                 args=ScaledField(form.filled(row), scale),
-                stepsize_controller=dfx.PIDController(self.rtol, self.atol, pcoeff=0.3, icoeff=0.4),
+                stepsize_controller=dfx.PIDController(self.tolerance, self.tolerance, pcoeff=0.3, icoeff=0.4),
                 saveat=dfx.SaveAt(t1=True),
                 adjoint=dfx.ForwardMode(),
-                max_steps=self.max_steps,
+                max_steps=MOST_STEPS,
                 throw=False,
             )
             assert solution.ys is not None
@@ -196,8 +185,7 @@ class NativeSteps(AbstractMethod):
 
     @property
     def in_jax(self) -> AdaptiveSteps:
-        solver = Rodas4() if self.pair == IMPLICIT else dfx.Tsit5()
-        return AdaptiveSteps(solver, self.tolerance, self.tolerance)
+        return AdaptiveSteps(Rodas4() if self.pair == IMPLICIT else dfx.Tsit5(), self.tolerance)
 
     @property
     def reference(self) -> "NativeSteps":
@@ -212,7 +200,6 @@ class NativeSteps(AbstractMethod):
         return self.in_jax.advance(*args, **kwargs)
 
     def finer(self, times: int = 1) -> "NativeSteps":
-        """The same with tolerances 16 times smaller, `times` over."""
         factor = FINER**-times
         return NativeSteps(factor * self.tolerance, factor * self.error, self.pair)
 
@@ -258,9 +245,13 @@ def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: fl
         return FixedSteps(_SOLVERS[solver], DEFAULT_STEPS if steps is None else steps)
     if steps is not None:
         raise ArgumentError("steps", "tolerance", said="must not both be given: steps are fixed or adaptive.")
+    _require_tolerance(tolerance)
+    return AdaptiveSteps(_SOLVERS[solver], tolerance)
+
+
+def _require_tolerance(tolerance: float) -> None:
     if not 0 < tolerance < 1:
         raise ArgumentError("tolerance", said=f"must lie between 0 and 1, but {tolerance} was given.")
-    return AdaptiveSteps(_SOLVERS[solver], tolerance, tolerance)
 
 
 def native(
@@ -275,8 +266,7 @@ def native(
 
     **Raises:** `ValueError` for numbers that are not positive, and an unknown pair.
     """
-    if not 0 < tolerance < 1:
-        raise ArgumentError("tolerance", said=f"must lie between 0 and 1, but {tolerance} was given.")
+    _require_tolerance(tolerance)
     if not error > 0:
         raise ArgumentError("error", said=f"must be positive, but {error} was given.")
     if pair not in PAIRS:
