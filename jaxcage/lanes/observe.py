@@ -4,6 +4,7 @@ Every lane runs by itself: what it does depends neither on its neighbours nor on
 lanes first.
 """
 
+import dataclasses
 import itertools
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -138,21 +139,21 @@ def _allowed(observer: "_Observer", method: AbstractMethod) -> Observation:
     return seen
 
 
+@dataclasses.dataclass
 class _Observer:
     """Some lanes, and how they are observed."""
 
-    def __init__(
-        self,
-        lanes: Lanes,
-        run: Run,
-        states: Float[np.ndarray, "lanes dim"],
-        limit: float,
-        report: Callable[[float], None],
-    ):
-        self.lanes, self.run, self.states, self.limit, self.report = lanes, run, states, limit, report
-        self.done = 0
-        """Revolutions of all lanes together."""
-        self.model = lanes.system
+    lanes: Lanes
+    run: Run
+    states: Float[np.ndarray, "lanes dim"]
+    limit: float
+    """Largest excursion from which a lane may start."""
+    report: Callable[[float], None]
+    done: int = 0
+    """Revolutions of all lanes together."""
+
+    def __post_init__(self):
+        self.model = self.lanes.system
         self.averages = len(self.model.beside) > 0
 
     def _segments(self) -> list[tuple[int, int, bool]]:

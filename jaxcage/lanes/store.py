@@ -73,7 +73,7 @@ class Store:
         """Chunks that are not finished, or are not what was written."""
         chunks = range(self.study.grid.chunks) if among is None else among
         unknown = [chunk for chunk in chunks if chunk not in self._finished]
-        self._finished |= {chunk for chunk in unknown if _damage(self.path, self._arrays, chunk) is None}
+        self._finished |= {chunk for chunk in unknown if _is_finished(self.path, self._arrays, chunk)}
         return [chunk for chunk in unknown if chunk not in self._finished]
 
     def write(self, chunk: int, results: Results) -> None:
@@ -119,24 +119,23 @@ def open_study(path: str | Path) -> xr.Dataset:
         raise _damaged(path, error) from error
 
 
-def _damage(path: Path, arrays: Mapping[str, Any], chunk: int) -> str | None:
-    """Why a chunk of a store is not finished: an empty text if it has never been, None if it is. The axes of all
-    variables begin with those of `outcome`."""
-    last = arrays[OUTCOME]
-    place = tuple(map(int, np.unravel_index(chunk, last.cdata_shape)))
+def _is_finished(path: Path, arrays: Mapping[str, Any], chunk: int) -> bool:
+    """True if all files of a chunk of a store are there and agree with their checksums. The axes of all variables begin
+    with those of `outcome`."""
+    counts = arrays[OUTCOME].cdata_shape
+    place = tuple(map(int, np.unravel_index(chunk, counts)))
     for name in sorted(arrays, key=lambda name: name != OUTCOME):
         array = arrays[name]
-        if array.ndim < last.ndim:  # a coordinate
+        if array.ndim < len(counts):  # a coordinate
             continue
-        block = place + (0,) * (array.ndim - last.ndim)
-        file = f"{name}/{array.metadata.encode_chunk_key(block)}"
-        if not (path / file).is_file():
-            return "" if name == OUTCOME else f"{file} is missing"
+        block = place + (0,) * (array.ndim - len(counts))
+        if not (path / name / array.metadata.encode_chunk_key(block)).is_file():
+            return False
         try:
             array.get_block_selection(block)
         except (ValueError, OSError):
-            return f"{file} is not what was written"
-    return None
+            return False
+    return True
 
 
 def _opened(path: Path, mode: str) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -166,12 +165,6 @@ def _damaged(path: str | Path, error: Exception) -> InputError:
     return InputError(f"The store '{path}' is damaged ({why}): choose another folder, or delete this one.")
 
 
-def _require_format(path: Path, about: Mapping[str, Any]) -> None:
-    if (theirs := about.get("store_format", 1)) != FORMAT:
-        said = f"and this version of jaxcage writes format {FORMAT}: it can be read, but not be added to or checked"
-        raise InputError(f"The store '{path}' is of format {theirs}, {said}.")
-
-
 @contextlib.contextmanager
 def _going_on(path: Path) -> Iterator[None]:
     """Around writing: what the system refuses becomes one sentence."""
@@ -194,7 +187,9 @@ def _same(path: Path, study: "Study") -> dict[str, Any]:
         about, arrays = _opened(path, "r+")
     except FileNotFoundError as error:
         raise ArgumentError("store", said=f"{refused} '{path}' is neither.") from error
-    _require_format(path, about)
+    if (theirs := about.get("store_format", 1)) != FORMAT:
+        said = f"and this version of jaxcage writes format {FORMAT}: it can be read, but not be added to"
+        raise InputError(f"The store '{path}' is of format {theirs}, {said}.")
     if about["study"] != study.description:
         different = _differences(json.loads(about["study"]), json.loads(study.description))
         what = ", ".join(different) or "its lanes"

@@ -4,11 +4,11 @@
 none. Both take and return the same arrays.
 """
 
+import concurrent.futures
 import copy
 import ctypes
 import functools
 import os
-import threading
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -127,7 +127,7 @@ class Engine:
         n, moving = field.dimension, field.moving
         limits, more = self._limits, max(1.0, MOST_AT / method.tolerance) ** (1 / self._order)
         most = limits.most * float(np.max(numbers.slow)) * more
-        loaded = np.zeros((rows.end("first_step"), lanes))
+        loaded = np.zeros((rows["first_step"].stop, lanes))
         loaded[:n], loaded[moving - field.beside : moving] = state[:, :n].T, state[:, n:].T
         if field.tangents:
             assert tangents is not None
@@ -135,11 +135,11 @@ class Engine:
         given = np.broadcast_to(np.nan if step is None else step, lanes)
         loaded[rows["step"][0]] = np.where(np.isnan(given), limits.first, given)
         loaded[rows["peak"]] = 0.0 if field.excursion is not None else -np.inf
-        wide = loaded[rows.end("mark") : rows.end("fixed")]
+        wide = loaded[rows["fixed"].start : rows["fixed"].stop]
         if field.own_turn:
             wide[0], wide[1] = REVOLUTION / self._samples if turn is None else turn, begin
         wide[SAMPLED * field.own_turn :] = numbers.wide
-        stored = np.zeros((rows.end("mark"), lanes))
+        stored = np.zeros((rows["mark"].stop, lanes))
         strobe = np.full((lanes, keep, field.recorded), np.nan)
         growth = np.full((lanes, strobes, field.tangents), np.nan)
         queue = np.zeros(2, dtype=np.int64)
@@ -148,7 +148,8 @@ class Engine:
         at = [x.ctypes.data for x in arrays]
         # A vector of one lane is faster than one of eight that holds one, where a law is large.
         width = 1 if field.excursion is None and lanes == 1 else WIDTH
-        run = lambda: self._compiled(width)(at[0], lanes, strobes, keep, *at[1:])
+        march = self._compiled(width)
+        run = lambda: march(at[0], lanes, strobes, keep, *at[1:])
         _run_threads(run, min(threads, -(-lanes // width)), queue, lambda: report(min(int(queue[0]), lanes)))
         part = lambda name: stored[rows[name][0]]
         turned = np.roll(strobe, -strobes % keep, axis=1)  # the latest last
@@ -172,19 +173,15 @@ class Engine:
 
 def _run_threads(run: Callable[[], None], count: int, queue: np.ndarray, report: Callable[[], None]) -> None:
     """`run` in threads of its own, interrupted by Ctrl-C within a moment: the flag in `queue` empties it."""
-    pool = [threading.Thread(target=run, daemon=True) for _ in range(count)]
-    try:
-        for each in pool:
-            each.start()
-        for each in pool:
-            while each.is_alive():
-                each.join(WAKES)
+    with concurrent.futures.ThreadPoolExecutor(count) as pool:
+        try:
+            left = {pool.submit(run) for _ in range(count)}
+            while left:
+                left = concurrent.futures.wait(left, WAKES).not_done
                 report()
-    except BaseException:
-        queue[1] = 1
-        for each in pool:
-            each.join()
-        raise
+        except BaseException:
+            queue[1] = 1
+            raise
 
 
 _engines: dict[Any, Engine | JaxEngine] = {}

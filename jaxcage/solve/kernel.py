@@ -6,7 +6,7 @@ The numbers of field, system and scale are what is fixed; the rest (structure, t
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import Any, NamedTuple, TypeGuard
+from typing import Any, NamedTuple
 
 import diffrax as dfx
 import equinox as eqx
@@ -22,7 +22,6 @@ from .program import Numbers
 from .solvers import Rodas4, explicit_step, rosenbrock_step
 
 
-KernelSolver = Rodas4 | dfx.AbstractERK
 Parts = Int[Array, ""] | Scalar
 """Number of equal parts of a revolution."""
 Tangents = Sequence[tuple[State, Sequence[Any] | None]]
@@ -38,7 +37,7 @@ class Pieces(NamedTuple):
     scale: State
 
 
-def can_be_kernel(solver: Any) -> TypeGuard[KernelSolver]:
+def can_be_kernel(solver: Any) -> bool:
     """True if a step of `solver` is a plain formula, as of ours, and of explicit methods whose last stage is kept."""
     if isinstance(solver, dfx.AbstractERK):
         return isinstance(solver.tableau, dfx.ButcherTableau) and solver.tableau.fsal
@@ -55,12 +54,12 @@ MORE = 8
 """Steps are added by so many parts of a revolution's, until all lanes are through."""
 
 
-def shortened(h: Scalar, near: tuple[Scalar, Scalar] | None, phase: Scalar, end: Scalar) -> Scalar:
-    """The step from `phase`, of the size h far from abrupt changes; the last one ends at `end`, and is 0 beyond it.
+def shortened(h: Scalar, near: Any, phase: Scalar, end: Scalar) -> Scalar:
+    """The step from `phase`, of the size h far from abrupt changes, by the distance from the nearest and the speed
+    towards it (`AbstractForcedSystem.abrupt`); the last one ends at `end`, and is 0 beyond it.
 
     It has no derivative: the mesh is what it is while the state on it is differentiated.
     """
-    assert near is not None
     distance, speed = near
     short = h * distance / (distance + NEARNESS * jnp.maximum(speed - distance / FAR, 0.0))
     short = jnp.maximum(short, SHORTEST * h)
@@ -92,7 +91,7 @@ class KernelStep:
     """One step for `march`: moved is the state; watched the largest excursion and, where steps are shortened, the
     phase; fixed the first phase, the step, the phase at the end, and the numbers of (field, system, scale)."""
 
-    solver: KernelSolver
+    solver: Any
     structure: Form
     abrupt: bool
     """True if the law changes abruptly somewhere: steps are shortened there."""
@@ -113,7 +112,6 @@ class KernelStep:
             return shortened(h, system.abrupt(moved, rate), t0, end) if self.abrupt else h
 
         if isinstance(self.solver, dfx.AbstractERK):
-            assert isinstance(self.solver.tableau, dfx.ButcherTableau)
             y, step = explicit_step(self.solver.tableau, field, t0, size, moved)
         else:
             y, _, _, step = rosenbrock_step(field, t0, size, moved)

@@ -16,7 +16,7 @@ from .ir import Code, Value, is_variable, number
 from .layout import REVOLUTION, Field, Layout, Tableau, fixed_numbers, layout_of, rates_arguments
 from .outcomes import FINISHED, NOT_FINITE, OUTSIDE, STUCK, TOO_MANY
 from .program import following
-from .step_control import Tried, limited_step, next_step, squared_error, step_to_strobe
+from .step_control import limited_step, next_step, squared_error, step_to_strobe
 
 
 def march_ir(field: Field, pair: str, width: int) -> str:
@@ -33,7 +33,7 @@ def march_ir(field: Field, pair: str, width: int) -> str:
     rates = field.rates.code(field, rows, width) if hasattr(field.rates, "code") else _rates(field, rows, width)
     implicit = [_implicit(field, rows, width)] if tableau.implicit else []
     first = {"mark": rows["mark"][0] * width, "lane": rows["lane"][0] * width}
-    refill = REFILL.format(width=width, n_stored=rows.end("mark"), n_loaded=rows.end("first_step"), **first)
+    refill = REFILL.format(width=width, n_stored=rows["mark"].stop, n_loaded=rows["first_step"].stop, **first)
     parts = [*made, rates, *implicit, (refill, set()), _loop(field, rows, tableau, width)]
     declarations = sorted(set().union(*(declared for _, declared in parts)))
     return "\n".join([*(text for text, _ in parts), *declarations, '!0 = !{!"branch_weights", i32 1, i32 30}', ""])
@@ -161,8 +161,8 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     w = Code(width)
     n, moving, stages, span = field.dimension, field.moving, len(tableau.phase), field.span
     one, zero, marked = number(1.0), number(0.0), lambda code: number(code + 1.0)
-    row = {name: rows[name][0] for name in rows.rows if len(rows[name]) > 0}
-    at_stage = lambda i: row["rate"] + i * span
+    row = {name: rows[name][0] for name in rows if rows[name]}
+    at_stage, total_rows = lambda i: row["rate"] + i * span, rows["made"].stop
     vector = w.type("double", True)
 
     def since_zero(phase: Value) -> Value:
@@ -179,8 +179,8 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
         at = w.at(place).text, w.at(out).text
         w.line(f"call void @rates({w.typed(phase)}, ptr {at[0]}, ptr %memory, ptr %shared, ptr {at[1]})")
 
-    w.line(f"%memory = alloca {vector}, i64 {rows.total}, align {max(64, width * 8)}")
-    size = rows.total * width * 8
+    w.line(f"%memory = alloca {vector}, i64 {total_rows}, align {max(64, width * 8)}")
+    size = total_rows * width * 8
     w.line(f"call void @llvm.memset.p0.i64(ptr align 8 %memory, i8 0, i64 {size}, i1 false)")
     w.declarations.add("declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)")
     for k, name in enumerate(("tolerance", "largest", "smallest", "most")):
@@ -234,7 +234,7 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     fine = w.compare("le", error, one)
     moves = w.both(fine, runs)
     bits, last = w.log2(error), w.get(row["error"])
-    proposed = next_step(w, tableau.order, Tried(step, limited, ends, halves, fine, bits, last), largest)
+    proposed = next_step(w, tableau.order, step, limited, w.simple("or", ends, halves), fine, bits, last, largest)
     w.put(row["step"], w.select(runs, proposed, h))
     w.put(row["error"], w.select(moves, w.larger(bits, number(-16.0)), last))
     over = w.both(moves, ends)

@@ -1,7 +1,6 @@
 """Time histories at constant speed and through a speed ramp."""
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -130,14 +129,6 @@ def _start(system: AbstractForcedSystem, speed: float, start: Start | None) -> n
     return np.concatenate([y0, beside])
 
 
-def _require_fits(method: AbstractMethod, samples: int) -> None:
-    """**Raises:** `ValueError` for a method that does not go with the samples."""
-    if isinstance(method, FixedSteps) and method.steps % samples:
-        raise ArgumentError(
-            "samples", said=f"must divide the {method.steps} steps per revolution of the method, but is {samples}."
-        )
-
-
 class _Ran(NamedTuple):
     """Strobe states by one method."""
 
@@ -184,12 +175,9 @@ def _run(lanes: Lanes, samples: int, stretch: int, start: np.ndarray, method: Ab
 
 def _methods(method: AbstractMethod, system: AbstractForcedSystem) -> Iterator[AbstractMethod]:
     """The method, finer ones for a run whose error is too large, and implicit ones."""
-    yield method
-    finer = range(1, RETRIES + 1) if math.isfinite(method.allowed) else ()
-    yield from map(method.finer, finer)
-    if isinstance(method, NativeSteps) and has_implicit(system) and method.pair != IMPLICIT:
-        yield method.implicit
-        yield from map(method.implicit.finer, finer)
+    native = isinstance(method, NativeSteps) and has_implicit(system) and method.pair != IMPLICIT
+    times = range(1 + RETRIES) if math.isfinite(method.allowed) else range(1)
+    return (each.finer(k) for each in ([method, method.implicit] if native else [method]) for k in times)
 
 
 def simulate(
@@ -249,7 +237,9 @@ def ramp(
     require_at_least(0, discard=discard)
     default = native(BEARING_TOLERANCE, BEARING_ERROR) if system.beside else native(TOLERANCE)
     chosen = default if method is None else method
-    _require_fits(chosen, samples)
+    if isinstance(chosen, FixedSteps) and chosen.steps % samples:
+        said = f"must divide the {chosen.steps} steps per revolution of the method, but is {samples}."
+        raise ArgumentError("samples", said=said)
     rise = (high - low) / revolutions
     numbers = np.arange(-discard, revolutions)
     rises = np.where(numbers < 0, 0.0, rise)
@@ -263,7 +253,7 @@ def ramp(
     runs = (_run(lanes, places, stretch, y0, each) for each in _methods(chosen, system))
     served = lambda ran: ran.code not in (STUCK, TOO_MANY) and not np.any(ran.errors > chosen.allowed)
     first_run = next(runs)
-    ran = next(filter(served, itertools.chain([first_run], runs)), first_run)
+    ran = first_run if served(first_run) else next(filter(served, runs), first_run)
     states, code = ran.states.copy(), ran.code
     if np.any(bad := ran.errors > chosen.allowed):  # behind a stretch whose error is too large nothing is known
         states[int(np.argmax(bad)) * stretch + 1 :] = np.nan
@@ -281,15 +271,9 @@ def ramp(
         states = states[:-1]
     excursion = lanes.begin(np.arange(speeds.size), ran.states[:-1])[1][::places]
     peak = float(np.fmax.reduce([*ran.peaks[discard * places :, -1], *excursion[discard:]]))
+    known = time, tau, states[:, :dim], speed, samples, peak, OUTCOMES[code], float(ran.errors.max())
     return Trajectory(
-        time,
-        tau,
-        states[:, :dim],
-        speed,
-        samples,
-        peak,
-        OUTCOMES[code],
-        float(ran.errors.max()),
+        *known,
         beside=system.beside,
         integrals=states[:, dim:],
         watched=system.watched,
