@@ -137,7 +137,9 @@ def settings_of(method: AbstractMethod) -> dict[str, str]:
 
 
 def flags(words: Sequence[str]) -> dict[str, Any]:
-    """Attributes of a variable that holds codes, with their meanings in the way of the CF conventions."""
+    """Attributes of a variable that holds codes, with their meanings in the way of the CF conventions; none without."""
+    if not words:
+        return {}
     return {"flag_values": [-1, *range(len(words))], "flag_meanings": " ".join([PENDING, *words])}
 
 

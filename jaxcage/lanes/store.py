@@ -7,6 +7,7 @@ the same files. Nothing in the folder depends on when, where or in which order i
 """
 
 import contextlib
+import dataclasses
 import json
 import os
 import shutil
@@ -42,12 +43,14 @@ class Variable(NamedTuple):
 
     text: str
     unit: str
-    within: tuple[str, ...] = ()
-    """Axes within a lane."""
+    exponents: bool = False
+    """True for one number of each exponent."""
     names: tuple[str, ...] = ()
     """Meanings of the codes 0, 1, ...; none for numbers that are no codes."""
 
 
+KNOWN = "jaxcage jax jaxlib numpy diffrax equinox lineax optimistix builtins".split()
+"""Packages whose code is known by their versions."""
 OUTCOME = "outcome"
 """The variable that is written last: a chunk without it has never been finished."""
 
@@ -60,7 +63,7 @@ class Store:
         for a study of the user's own code without a name and a version.
         """
         self.path, self.study = Path(path), study
-        if (own := study.own_code) and not (study.name and study.version):
+        if (own := _own_code([study.model, study.run.method])) and not (study.name and study.version):
             said = f"must be given, since a store cannot tell by itself whether your own {own} is still the same."
             raise ArgumentError("name", "version", said=said)
         with _going_on(self.path):
@@ -207,6 +210,18 @@ def _differences(theirs: Any, ours: Any, name: str = "") -> list[str]:
     return [found for key in keys for found in _differences(theirs.get(key), ours.get(key), dotted(key))]
 
 
+def _own_code(x: Any) -> str | None:
+    """The first class or function in a tree that belongs neither to this package nor to one that it is built on."""
+    if isinstance(x, tuple | list | dict):
+        parts = list(x.values() if isinstance(x, dict) else x)
+    else:
+        module = getattr(x, "__module__", None) or type(x).__module__
+        if module.partition(".")[0] not in KNOWN:
+            return getattr(x, "__name__", type(x).__name__)
+        parts = [getattr(x, f.name, None) for f in dataclasses.fields(x)] if dataclasses.is_dataclass(x) else []
+    return next(filter(None, map(_own_code, parts)), None)
+
+
 # The empty store: what describes it follows from the study alone, byte for byte.
 
 
@@ -236,7 +251,7 @@ def _write(path: Path, study: "Study") -> None:
     dataset.to_zarr(path, mode="w", consolidated=False, encoding=checked)
     group = zarr.open_group(path, mode="r+", zarr_format=3, use_consolidated=False)
     for name, variable in study.variables.items():
-        extra = [study.within[d].size for d in variable.within]
+        axes, extra = (("exponent",), (study.run.exponents,)) if variable.exponents else ((), ())
         group.create_array(
             name,
             shape=(*plan.shape, *extra),
@@ -244,12 +259,8 @@ def _write(path: Path, study: "Study") -> None:
             dtype="int8" if variable.names else "float64",
             fill_value=-1 if variable.names else np.nan,
             compressors=compressors,
-            dimension_names=(*plan.axes, *variable.within),
-            attributes={
-                "long_name": variable.text,
-                "units": variable.unit,
-                **(flags(variable.names) if variable.names else {}),
-            },
+            dimension_names=(*plan.axes, *axes),
+            attributes={"long_name": variable.text, "units": variable.unit, **flags(variable.names)},
         )
     with warnings.catch_warnings():  # zarr warns that the specification does not have this yet; xarray warns without it
         warnings.simplefilter("ignore")
@@ -270,7 +281,8 @@ def _coordinates(study: "Study") -> dict[str, Any]:
     found: dict[str, Any] = {name: (name, np.asarray(x), words(name)) for name, x in grid.values.items()}
     found |= {name: (SAMPLE, x, words(name)) for name, x in grid.cloud.items()}
     dims, speed, about = found[SPEED]
-    return found | {"rpm": (dims, speed * 30 / np.pi, about | {"units": "rpm"})} | study.within
+    exponents = np.arange(1, study.run.exponents + 1)
+    return found | {"rpm": (dims, speed * 30 / np.pi, about | {"units": "rpm"}), "exponent": exponents}
 
 
 def _attributes(study: "Study") -> dict[str, Any]:

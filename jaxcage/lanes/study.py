@@ -11,7 +11,7 @@ import equinox as eqx
 import jax
 import numpy as np
 import xarray as xr
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
@@ -35,8 +35,6 @@ Vary = Mapping[str, Float[Array, " values"] | Float[np.ndarray, " values"] | Bet
 """Parameter, or `"speed"` or `"oil"` -> values that make an axis of the grid [SI], or how to sample it."""
 Shard = tuple[int, int]
 """(i, n): the i-th of n parts, counted from 1."""
-KNOWN = "jaxcage jax jaxlib numpy diffrax equinox lineax optimistix builtins".split()
-"""Packages whose code is known by their versions."""
 SCALARS = ("peak", "error", "steps")
 """Numbers that every lane has, whatever its model reports."""
 
@@ -71,34 +69,20 @@ class Study:
         known = lambda name: (quantity(name).text, quantity(name).unit)
         found = {name: Variable(*known(name)) for name in SCALARS}
         if self.run.exponents:
-            found["exponents"] = Variable(*known("exponent"), ("exponent",))
-            found["standard_error"] = Variable(*known("standard_error"), ("exponent",))
+            found["exponents"] = Variable(*known("exponent"), exponents=True)
+            found["standard_error"] = Variable(*known("standard_error"), exponents=True)
         for each in self.model.quantities:
             found[each.name] = Variable(each.text, each.unit)
             found[f"{each.name}_standard_error"] = Variable(f"standard error, {each.text}", each.unit)
         return found | {name: Variable(*known(name), names=words) for name, words in CODES.items()}
 
-    @property
-    def within(self) -> dict[str, np.ndarray]:
-        """Axes within a lane, with their coordinates."""
-        return {"exponent": np.arange(1, self.run.exponents + 1)}
-
-    @property
-    def own_code(self) -> str | None:
-        """A class or function of the user's own that lanes are computed by, None if there is none."""
-        return _own_code([self.model, self.run.method])
-
     def chunk(self, number: int) -> Results:
-        """The results of a chunk, laid out as its block of the grid."""
-        found = self.at(self.grid.lanes_of(number))
+        """The results of a chunk, laid out as its block of the grid; the bits of a lane are the same in any company."""
+        found = coded(run_lanes(self.grid.plan(self.model, self.grid.lanes_of(number)), self.run))
+        values = {name: x.values for name, x in found.data_vars.items()}
+        values |= {f"{x.name}_standard_error": scatter(values[f"{x.name}_blocks"]) for x in self.model.quantities}
         shape = tuple(part.stop - part.start for part in self.grid.region(number))
-        return {name: x.reshape(*shape, *x.shape[1:]) for name, x in found.items()}
-
-    def at(self, lanes: Int[np.ndarray, " lanes"]) -> Results:
-        """The results of any lanes, by their numbers; the bits are the same whatever their company."""
-        found = coded(run_lanes(self.grid.plan(self.model, lanes), self.run))
-        errors = {f"{x.name}_standard_error": scatter(found[f"{x.name}_blocks"].values) for x in self.model.quantities}
-        return {name: errors[name] if name in errors else found[name].values for name in self.variables}
+        return {name: values[name].reshape(*shape, *values[name].shape[1:]) for name in self.variables}
 
 
 def study(
@@ -232,8 +216,8 @@ def label_map(
     if persist and (again := np.flatnonzero(found["label"].values.ravel() == "chaotic")).size:
         longer = dataclasses.replace(run, discard=persist)
         later = run_lanes(grid.plan(model, again), longer, say(f"{again.size} chaotic lanes again"))
-        for name, x in found.data_vars.items():
-            x.values.reshape(grid.size, *x.shape[len(grid.shape) :])[again] = later[name].values
+        for name, all_lanes in found.data_vars.items():
+            all_lanes.values.reshape(grid.size, *all_lanes.shape[len(grid.shape) :])[again] = later[name].values
     return found if speed is None else found.isel({SPEED: 0})
 
 
@@ -242,15 +226,3 @@ def numbers_of(module: eqx.Module) -> dict[str, Any]:
     leaves, _ = jax.tree_util.tree_flatten_with_path(module)
     named = lambda path: jax.tree_util.keystr(path).lstrip(".")
     return {named(path): np.asarray(x).tolist() for path, x in leaves if eqx.is_array_like(x)}
-
-
-def _own_code(x: Any) -> str | None:
-    """The first class or function in a tree that belongs neither to this package nor to one that it is built on."""
-    if isinstance(x, tuple | list | dict):
-        parts = list(x.values() if isinstance(x, dict) else x)
-    else:
-        module = getattr(x, "__module__", None) or type(x).__module__
-        if module.partition(".")[0] not in KNOWN:
-            return getattr(x, "__name__", type(x).__name__)
-        parts = [getattr(x, f.name, None) for f in dataclasses.fields(x)] if dataclasses.is_dataclass(x) else []
-    return next(filter(None, map(_own_code, parts)), None)

@@ -331,7 +331,7 @@ class Code:
         known |= {v: number(c) for v, c in zip(jaxpr.constvars, program.consts, strict=True)}
         read = lambda atom: known[atom] if is_variable(atom) else number(atom.val)
         for path, equations in in_groups(jaxpr.eqns, branches(jaxpr.eqns, jaxpr.outvars)):
-            before = self.block
+            before = block = after = self.block
             if path:
                 some = self.any(self.both(*(known[m] if side else self.negated(known[m]) for m, side in path)))
                 self.names += 1

@@ -175,9 +175,11 @@ def _run(lanes: Lanes, samples: int, stretch: int, start: np.ndarray, method: Ab
 
 def _methods(method: AbstractMethod, system: AbstractForcedSystem) -> Iterator[AbstractMethod]:
     """The method, finer ones for a run whose error is too large, and implicit ones."""
-    native = isinstance(method, NativeSteps) and has_implicit(system) and method.pair != IMPLICIT
+    every = [method]
+    if isinstance(method, NativeSteps) and has_implicit(system) and method.pair != IMPLICIT:
+        every.append(method.implicit)
     times = range(1 + RETRIES) if math.isfinite(method.allowed) else range(1)
-    return (each.finer(k) for each in ([method, method.implicit] if native else [method]) for k in times)
+    return (each.finer(k) for each in every for k in times)
 
 
 def simulate(
