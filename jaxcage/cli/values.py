@@ -112,7 +112,8 @@ def _read(name: str, text: str, subject: Subject) -> Any:
             raise ValueError(f"must have a deviation above 0, but {deviation:g} was given.")
         return jc.lanes.Between(value - deviation, value + deviation, normal=True)
     if len(parts) == 2:
-        return jc.lanes.Between(*map(number, parts))
+        lower, upper = map(number, parts)
+        return jc.lanes.Between(lower, upper)
     if len(parts) == 3 and not (parts[2].strip().isdecimal() and 1 <= int(parts[2]) <= MOST):
         raise ValueError(f"must have a number of values from 1 to {MOST} at its end, but has '{parts[2]}'.")
     if len(parts) > 3:
