@@ -16,15 +16,11 @@ from jaxcage.solve import FINISHED, Engine, Lanes, engine_of, histories, say_onc
 from jaxcage.solve.object_code import object_code
 
 
-def rows_of(system: Any) -> list[Any]:
-    return [x for x in jax.tree.leaves(system) if eqx.is_inexact_array(x)]
-
-
 def march(system: Any, speed: np.ndarray, y: np.ndarray, revolutions: int, tolerance: float = 1e-8, **more: Any) -> Any:
     method = jc.native(tolerance, pair=more.pop("pair", "tsit5"))
     engine = engine_of(system, 0, False, method)
     assert isinstance(engine, Engine)
-    return engine(engine.numbers(speed, rows_of(system)), y, revolutions, revolutions, method, **more)
+    return engine(engine.numbers(Lanes.of([system], speed)), y, revolutions, revolutions, method, **more)
 
 
 OPERATIONS = {
@@ -60,7 +56,7 @@ def test_revolutions_are_those_of_scipy(pair: str):
     scale = np.array([[float(c) for c in model.scale(jnp.asarray(v))] for v in speed])
     y = np.array([[float(c) for c in model.starts(jnp.asarray(v))[0]] for v in speed]) / scale
     found = march(model, speed, y, 3, tolerance=1e-9 if pair != "bosh3" else 1e-8, pair=pair)
-    assert np.all(found.mark == FINISHED)
+    assert np.all(found.outcome == FINISHED)
     for i, v in enumerate(speed):
         field = model.at_speed(jnp.asarray(v))
         rates = jax.jit(lambda tau, z, field=field, s=scale[i]: jnp.stack(field(tau, tuple(z * s))) / s)

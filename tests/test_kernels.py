@@ -14,7 +14,7 @@ import jaxcage as jc
 from jaxcage._pytrees import compiled
 from jaxcage.analysis import failed
 from jaxcage.solve import march, method, native, strobe_map
-from jaxcage.solve.method import TERM, moved_by
+from jaxcage.solve.method import TERM
 
 
 MODEL = jc.case("1a", "preliminary")
@@ -93,7 +93,7 @@ EVEN = even(MODEL)
 def by_lanes(chosen, directions=()):
     @compiled
     def run(model, speed, y, tangents):
-        one = lambda s, y, t: moved_by(strobe_map(model, s, chosen), y, t)
+        one = lambda s, y, t: strobe_map(model, s, chosen)(y, [(one, None) for one in t])
         return jax.vmap(one)(speed, y, tangents)
 
     tangents = tuple(lane_state(np.broadcast_to(d, STATES.shape)) for d in directions)

@@ -49,7 +49,7 @@ def test_a_lane_is_a_simulation(start):
     model = bearing()
     ran, _ = run_samples(model, [start, rolling_start(model, SPEED, 1), rolling_start(model, SPEED)], 2, 1e-9, along())
     run = jc.simulate(model, SPEED, revolutions=1, samples=32, start=start, method=jc.native(1e-9, 1e-2))
-    assert np.all(ran.mark == FINISHED) and run.outcome == "successful"
+    assert np.all(ran.outcome == FINISHED) and run.outcome == "successful"
     unit = np.asarray(state_scale(model, SPEED).row)
     moved = np.abs(run.state[4] / unit - in_units(model, start)).max()
     assert np.abs(ran.strobe[0, :, :74] - run.state[2:5:2] / unit).max() < 1e-5 < 1e-2 < moved
@@ -97,7 +97,7 @@ def test_a_lane_that_fails_leaves_its_neighbours_as_they_are(start):
     ran, alone = (
         run_samples(model, [start, *others], 1, 1e-5, along())[0] for others in ((stalled, broken), (start, start))
     )
-    assert list(ran.mark) == [FINISHED, OUTSIDE, NOT_FINITE]
+    assert list(ran.outcome) == [FINISHED, OUTSIDE, NOT_FINITE]
     np.testing.assert_array_equal(ran.state[0], alone.state[0])
     assert ran.growth[0] == alone.growth[0] and np.isfinite(ran.growth[0])
 

@@ -50,7 +50,7 @@ def read_bounds(given: Sequence[str], subject: Subject) -> dict[str, tuple[float
 
     def read(name: str, text: str) -> Any:
         between = None if name in (SPEED, OIL) else _read(name, text, subject)
-        if not isinstance(between, jc.lanes.Between):
+        if not isinstance(between, jc.lanes.Between) or between.normal:
             raise ValueError(f"must be a parameter's NAME=LOWER:UPPER, but is {text}.")
         if names and name not in names:
             raise InputError(f"Option --vary must name one of {', '.join(names)}, but names '{name}'.")
@@ -136,9 +136,13 @@ def _read(name: str, text: str, subject: Subject) -> Any:
         return jc.files.to_si(part, info[name].unit if name in info else "1")
 
     if len(tolerance) == 2:
-        return jc.lanes.Tolerance(*map(number, tolerance))
+        value, deviation = map(number, tolerance)
+        if not deviation > 0:
+            raise ValueError(f"must have a deviation above 0, but {deviation:g} was given.")
+        return jc.lanes.Between(value - deviation, value + deviation, normal=True)
     if len(parts) == 2:
-        return jc.lanes.Between(*map(number, parts))
+        lower, upper = map(number, parts)
+        return jc.lanes.Between(lower, upper)
     if len(parts) > 3:
         raise ValueError(f"must have {FORMS}, but '{text}' was given.")
     if len(parts) == 3:

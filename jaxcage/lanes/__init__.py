@@ -16,23 +16,8 @@
 """
 
 from .._arguments import check_layer
-from .confirm import Confirmation as Confirmation
-from .dataset import (
-    load as load,
-    save as save,
-    settings_of as settings_of,
-    stored_configuration as stored_configuration,
-    versions as versions,
-)
-from .grid import (
-    OIL as OIL,
-    Between as Between,
-    Grid as Grid,
-    Spread as Spread,
-    Tolerance as Tolerance,
-    sobol as sobol,
-    with_values as with_values,
-)
+from .dataset import load as load, save as save, stored_configuration as stored_configuration
+from .grid import Between as Between, Grid as Grid, sobol as sobol, with_values as with_values
 from .observe import Progress as Progress, start_tangents as start_tangents
 from .plan import Plan as Plan, Speeds as Speeds, States as States, initial_states as initial_states, rpm as rpm
 from .ramps import (
@@ -43,14 +28,8 @@ from .ramps import (
 )
 from .run import run_lanes as run_lanes, sweep as sweep
 from .settings import Run as Run
-from .store import (
-    DamagedStore as DamagedStore,
-    OtherStudy as OtherStudy,
-    Store as Store,
-    check_study as check_study,
-    open_study as open_study,
-)
+from .store import Store as Store, open_study as open_study
 from .study import Study as Study, label_map as label_map, run_study as run_study, study as study
 
 
-check_layer(globals(), "check_study label_map open_study study sweep")
+check_layer(globals(), "label_map open_study study sweep")

@@ -7,12 +7,11 @@ confirmed in turn. A chaotic transient may end in one run and not in the other: 
 and how long transients last is a question of its own (`horizon`).
 """
 
-import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Int, Shaped
+from jaxtyping import Int, Shaped
 
 
 CONFIRMATIONS = 2
@@ -22,22 +21,7 @@ SHARE = 0.1
 SEED = 0
 
 
-class Confirmation(NamedTuple):
-    """Counts of one round of lanes that were run again with finer steps."""
-
-    lanes: int
-    changed: int
-    """Lanes whose label is another one."""
-    moved: int
-    """Lanes of the same label whose exponent differs by more than its error."""
-
-    def __str__(self) -> str:
-        moved = f", {self.moved} exponents moved" if self.moved else ""
-        return f"{self.changed} of {self.lanes} labels changed{moved}"
-
-
-@dataclasses.dataclass(frozen=True)
-class Labelled:
+class Labelled(NamedTuple):
     """Labels of lanes, with the largest exponent and its standard error."""
 
     label: Shaped[np.ndarray, " lanes"]
@@ -46,44 +30,42 @@ class Labelled:
 
     def at(self, lanes: np.ndarray) -> "Labelled":
         """Some of them."""
-        return Labelled(self.label[lanes], self.exponent[lanes], self.error[lanes])
-
-
-def doubtful(label: Shaped[np.ndarray, "*designs speeds starts"]) -> Int[np.ndarray, " lanes"]:
-    """Lanes to be confirmed, by their place in the raveled labels."""
-    periodic = np.char.startswith(label, "periodic")
-    failed = np.isin(label, ("failed", "inaccurate"))
-    near = ~periodic & ~failed
-    beside = near.copy()
-    beside[..., 1:, :] |= near[..., :-1, :]
-    beside[..., :-1, :] |= near[..., 1:, :]
-    drawn = np.random.default_rng(SEED).random(label.shape) < SHARE
-    return np.flatnonzero((beside | drawn) & ~failed)
+        return Labelled(*(x[lanes] for x in self))
 
 
 def confirm(
-    lanes: Int[np.ndarray, " some"], labelled: Labelled, again: Callable[[Int[np.ndarray, " some"], int], Labelled]
-) -> tuple[Confirmation, ...]:
-    """Run `lanes` again with finer and finer steps, as long as their labels change.
+    labelled: Labelled, shape: tuple[int, ...], again: Callable[[Int[np.ndarray, " some"], int], Labelled]
+) -> list[tuple[int, int, int]]:
+    """Run the doubtful lanes again with finer and finer steps, as long as their labels change.
 
-    **Arguments:** lanes; labels of all; `again(lanes, times)` runs them with steps refined so many times, puts the
-    results in place of those before, and returns the labels of these lanes.
+    **Arguments:** labels of all lanes; how lanes are laid out, speeds and initial states last; `again(lanes, times)`
+    runs some of them with steps refined so many times, puts the results in place of those before, and returns their
+    labels.
+
+    **Returns:** of each round the number of lanes that were run again, that of labels that changed, and that of
+    exponents that moved by more than their error under the same label.
     """
     rounds = []
+    lanes = _doubtful(labelled.label.reshape(shape))
     before = labelled.at(lanes)
     for times in range(1, CONFIRMATIONS + 1):
         if not lanes.size:
             break
         after = again(lanes, times)
         changed = before.label != after.label
-        moved = ~changed & ~_agree(before, after)
-        rounds.append(Confirmation(lanes.size, int(np.sum(changed)), int(np.sum(moved))))
-        doubted = changed | moved
-        lanes, before = lanes[doubted], after.at(doubted)
-    return tuple(rounds)
+        apart = np.abs(before.exponent - after.exponent)  # NaN of a failed lane is not apart
+        moved = ~changed & (apart > np.maximum(3 * np.hypot(before.error, after.error), 0.01))
+        rounds.append((lanes.size, int(np.sum(changed)), int(np.sum(moved))))
+        lanes, before = lanes[changed | moved], after.at(changed | moved)
+    return rounds
 
 
-def _agree(a: Labelled, b: Labelled) -> Bool[np.ndarray, " lanes"]:
-    """Exponents within three standard errors; a failed lane has none, and agrees."""
-    apart = np.abs(a.exponent - b.exponent)
-    return ~(apart > np.maximum(3 * np.hypot(a.error, b.error), 0.01))
+def _doubtful(label: Shaped[np.ndarray, "*designs speeds starts"]) -> Int[np.ndarray, " lanes"]:
+    """Lanes to be confirmed, by their place in the raveled labels."""
+    failed = np.isin(label, ("failed", "inaccurate"))
+    near = ~np.char.startswith(label, "periodic") & ~failed
+    beside = near.copy()
+    beside[..., 1:, :] |= near[..., :-1, :]
+    beside[..., :-1, :] |= near[..., 1:, :]
+    drawn = np.random.default_rng(SEED).random(label.shape) < SHARE
+    return np.flatnonzero((beside | drawn) & ~failed)

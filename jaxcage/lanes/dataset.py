@@ -14,10 +14,9 @@ Variables, over the axes of the plan (`speed` and `start` of a sweep) and what s
 | quantities of the model, and `NAME_blocks` (block) | means and largest values, and those of each block |
 """
 
-import dataclasses
 import functools
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -30,9 +29,8 @@ from .._errors import InputError
 from ..analysis import LABELS, scatter
 from ..files import configuration, replacing
 from ..models import AbstractForcedSystem
-from ..quantities import Quantity, averaged, quantity
+from ..quantities import averaged, quantity
 from ..solve import OUTCOMES, AbstractMethod
-from .confirm import Confirmation
 from .observe import Observation
 from .plan import SPEED, Plan
 from .settings import Run
@@ -43,32 +41,25 @@ CODES: dict[str, tuple[str, ...]] = {"label": LABELS, "outcome": OUTCOMES}
 PENDING = "pending"
 
 
-@dataclasses.dataclass(frozen=True)
-class Found:
-    """All that is known of the lanes of a plan after their run."""
-
-    plan: Plan
-    run: Run
-    seen: Observation
-    scale: Float[np.ndarray, "lanes dim"]
-    label: Shaped[np.ndarray, " lanes"]
-    escape: Float[np.ndarray, " lanes"] | None = None
-    horizon: int = 0
-    confirmed: tuple[Confirmation, ...] = ()
-
-
 def exponent_error(seen: Observation) -> Float[np.ndarray, "lanes exponents"]:
     """Standard error of the exponents: scatter of the blocks, and the error of the steps."""
     return np.hypot(scatter(seen.growth, axis=1), seen.doubt)
 
 
-def dataset(found: Found) -> xr.Dataset:
-    """The lanes as a data set."""
-    plan, run, seen, model = found.plan, found.run, found.seen, found.plan.model
-    last = run.discard + run.revolutions
-    label = found.label.copy()
-    if found.escape is not None:
-        label[(label == "chaotic") & np.isfinite(found.escape)] = "transient"
+def dataset(
+    plan: Plan,
+    run: Run,
+    seen: Observation,
+    scale: Float[np.ndarray, "lanes dim"],
+    label: Shaped[np.ndarray, " lanes"],
+    confirmed: Sequence[tuple[int, int, int]] = (),
+    escape: Float[np.ndarray, " lanes"] | None = None,
+    horizon: int = 0,
+) -> xr.Dataset:
+    """The lanes of a plan as a data set, with all that is known of them after their run."""
+    model, last = plan.model, run.discard + run.revolutions
+    if escape is not None:
+        label = np.where((label == "chaotic") & np.isfinite(escape), "transient", label)
     values: dict[str, tuple[tuple[str, ...], np.ndarray]] = {
         "label": ((), label),
         "outcome": ((), np.array(OUTCOMES)[seen.outcome]),
@@ -80,14 +71,16 @@ def dataset(found: Found) -> xr.Dataset:
         "error": ((), seen.error),
         "steps": ((), seen.steps),
         "last": (("component",), seen.last),
-        "scale": (("component",), found.scale),
+        "scale": (("component",), scale),
     }
     if not model.beside:
         values["strobe"] = ("revolution", "component"), seen.strobe
-    if found.escape is not None:
-        values["escape"] = (), found.escape
+    if escape is not None:
+        values["escape"] = (), escape
     about = {name: quantity("exponent" if name == "exponents" else name) for name in values}
-    for each, whole, blocks in _averaged(found):
+    given = model.beside, model.watched[1:], seen.integrals, seen.largest
+    numbers = plan.lanes.each(type(model).reference, np.arange(len(scale))) if model.quantities else {}
+    for each, whole, blocks in averaged(model.quantities, *given, numbers, float(run.block)):
         values[each.name], about[each.name] = ((), whole), each
         values[f"{each.name}_blocks"], about[f"{each.name}_blocks"] = (("block",), blocks), each
     shaped = lambda x: x.reshape(*plan.shape, *x.shape[1:])
@@ -96,17 +89,16 @@ def dataset(found: Found) -> xr.Dataset:
     coordinates: dict[str, Any] = {"component": np.array(model.components, dtype=object), **_coordinates(plan)}
     if not model.beside:
         coordinates["revolution"] = np.arange(last - run.keep + 1, last + 1)
-    return xr.Dataset(variables, coordinates, _attributes(found))
-
-
-def _averaged(found: Found) -> list[tuple[Quantity, np.ndarray, np.ndarray]]:
-    """Each quantity that the model reports, its value over the whole run and in each block."""
-    model, seen, lanes = found.plan.model, found.seen, found.plan.lanes
-    if not model.quantities:
-        return []
-    numbers = lanes.each(type(model).reference, np.arange(len(found.scale)))
-    given = model.beside, model.watched[1:], seen.integrals, seen.largest, numbers, float(found.run.block)
-    return averaged(model.quantities, *given)
+    attributes = {
+        "title": "jaxcage run",
+        "model": type(model).__name__,
+        "discard": run.discard,
+        "revolutions": run.revolutions,
+        "horizon": horizon,
+        "confirmed": json.dumps(confirmed),
+        "settings": json.dumps(settings_of(run.method)),
+    }
+    return xr.Dataset(variables, coordinates, attributes | ({} if plan.lanes.several else configuration_of(model)))
 
 
 def _coordinates(plan: Plan) -> dict[str, Any]:
@@ -126,60 +118,48 @@ def _coordinates(plan: Plan) -> dict[str, Any]:
     return found
 
 
-def _attributes(found: Found) -> dict[str, Any]:
-    run = found.run
-    configured = None if found.plan.lanes.several else configuration_of(found.plan.model)
-    return {
-        "title": "jaxcage run",
-        "model": type(found.plan.model).__name__,
-        "discard": run.discard,
-        "revolutions": run.revolutions,
-        "horizon": found.horizon,
-        "confirmed": json.dumps(found.confirmed),
-        "settings": json.dumps(settings_of(run.method)),
-        **({} if configured is None else {"configuration": json.dumps(configured)}),
-    }
-
-
-def configuration_of(model: AbstractForcedSystem) -> dict[str, Any] | None:
-    """The TOML configuration of a model as a nested mapping; None where no file can hold it."""
+def configuration_of(model: AbstractForcedSystem) -> dict[str, str]:
+    """The TOML configuration of a model as an attribute, a nested mapping in JSON; none where no file can hold it."""
     try:
-        return configuration(model)
+        return {"configuration": json.dumps(configuration(model))}
     except InputError:
-        return None
+        return {}
 
 
 @functools.cache
-def versions() -> dict[str, str]:
-    """Versions of the packages that lanes are computed with."""
+def _versions() -> dict[str, str]:
     return {f"version_{p}": version(p) for p in ("jaxcage", "jax", "diffrax", "equinox", "numpy")}
 
 
 def settings_of(method: AbstractMethod) -> dict[str, str]:
-    """Method and versions, by which a result can be reproduced."""
-    return {"method": str(method).replace("\n", " "), **versions()}
+    """Method and versions of the packages, by which a result can be reproduced."""
+    return {"method": str(method).replace("\n", " "), **_versions()}
+
+
+def flags(words: Sequence[str]) -> dict[str, Any]:
+    """Attributes of a variable that holds codes, with their meanings in the way of the CF conventions; none without."""
+    if not words:
+        return {}
+    return {"flag_values": [-1, *range(len(words))], "flag_meanings": " ".join([PENDING, *words])}
 
 
 def coded(found: xr.Dataset) -> xr.Dataset:
-    """The data set with codes in place of words, and their meanings in the way of the CF conventions."""
-    for name, words in CODES.items():
-        if name in found:
-            number = {word: code for code, word in enumerate(words)} | {PENDING: -1}
-            codes = np.array([number[word] for word in found[name].values.ravel()], dtype=np.int8)
-            found = found.assign({name: found[name].copy(data=codes.reshape(found[name].shape))})
-            found[name].attrs |= {"flag_values": [-1, *range(len(words))], "flag_meanings": " ".join([PENDING, *words])}
+    """The data set with codes in place of words."""
+    for name in CODES.keys() & found.data_vars.keys():
+        codes = np.full(found[name].shape, -1, dtype=np.int8)
+        for code, word in enumerate(CODES[name]):
+            codes[found[name].values == word] = code
+        found = found.assign({name: found[name].copy(data=codes).assign_attrs(flags(CODES[name]))})
     return found
 
 
 def decoded(found: xr.Dataset) -> xr.Dataset:
     """The data set with words in place of codes."""
-    for name in CODES:
-        if name in found and "flag_meanings" in found[name].attrs:
-            words = np.array(found[name].attrs["flag_meanings"].split())
-            values = dict(zip(found[name].attrs["flag_values"], words, strict=True))
-            at = np.vectorize(values.__getitem__, otypes=[words.dtype])
-            found = found.assign({name: found[name].copy(data=at(found[name].values))})
-            found[name].attrs = {k: v for k, v in found[name].attrs.items() if not k.startswith("flag_")}
+    for name in CODES.keys() & found.data_vars.keys():
+        attributes = dict(found[name].attrs)
+        if words := attributes.pop("flag_meanings", ""):
+            codes = np.searchsorted(attributes.pop("flag_values"), found[name].values)
+            found = found.assign({name: (found[name].dims, np.array(words.split())[codes], attributes)})
     return found
 
 

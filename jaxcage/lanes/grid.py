@@ -14,7 +14,6 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-import xarray as xr
 from jaxtyping import Float, Int
 
 from .._arguments import require_at_least
@@ -49,12 +48,14 @@ SIGMAS = 3.0
 
 @dataclasses.dataclass(frozen=True)
 class Between:
-    """Every value between two bounds is as likely as any other."""
+    """Values of a parameter between two bounds, each as likely as any other; or of a tolerance, `normal` around its
+    middle with its ends at `SIGMAS` standard deviations, and what lies outside sorted out."""
 
     lower: float
     """[SI]."""
     upper: float
     """[SI]."""
+    normal: bool = False
 
     def __post_init__(self):
         if not (math.isfinite(self.lower) and math.isfinite(self.upper) and self.lower < self.upper):
@@ -69,43 +70,12 @@ class Between:
 
     def at(self, place: Float[np.ndarray, " samples"]) -> Float[np.ndarray, " samples"]:
         """Values [SI] below which the shares `place` of all values lie."""
-        return self.lower + place * (self.upper - self.lower)
-
-
-@dataclasses.dataclass(frozen=True)
-class Tolerance:
-    """A nominal value and the deviation allowed to either side.
-
-    Values are normally distributed with a third of the deviation as their standard deviation, and what lies outside the
-    tolerance is sorted out.
-    """
-
-    value: float
-    """Nominal value [SI]."""
-    deviation: float
-    """Largest deviation [SI]."""
-
-    def __post_init__(self):
-        if not (math.isfinite(self.value) and math.isfinite(self.deviation) and self.deviation > 0):
-            raise ArgumentError(
-                "value",
-                "deviation",
-                said=f"must be a number and one above 0, but {self.value:g} and {self.deviation:g} were given.",
-            )
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Smallest and largest value [SI]."""
-        return self.value - self.deviation, self.value + self.deviation
-
-    def at(self, place: Float[np.ndarray, " samples"]) -> Float[np.ndarray, " samples"]:
-        """Values [SI] below which the shares `place` of all values lie."""
+        if not self.normal:
+            return self.lower + place * (self.upper - self.lower)
         from scipy.stats import truncnorm  # takes half a second to load
 
-        return truncnorm.ppf(place, -SIGMAS, SIGMAS, loc=self.value, scale=self.deviation / SIGMAS)
-
-
-Spread = Between | Tolerance
+        middle, deviation = 0.5 * (self.lower + self.upper), (self.upper - self.lower) / (2 * SIGMAS)
+        return truncnorm.ppf(place, -SIGMAS, SIGMAS, loc=middle, scale=deviation)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -114,7 +84,7 @@ class Grid:
 
     values: Mapping[str, Float[np.ndarray, " values"]]
     """Parameter -> its values [SI], one axis each."""
-    sampled: Mapping[str, Spread]
+    sampled: Mapping[str, Between]
     """Parameter -> how it is sampled; all of them together are one axis."""
     samples: int
     seed: int
@@ -220,26 +190,21 @@ class Grid:
         if self.starts > (own := len(model.starts(1.0))):
             raise ArgumentError("starts", said=f"must be at most {own}, but {self.starts} was given.")
 
-    def plan(self, model: AbstractForcedSystem, lanes: Int[np.ndarray, " lanes"]) -> Plan:
-        """Some lanes of a model, on one axis `lane`."""
-        values, start = self.at(lanes)
+    def plan(self, model: AbstractForcedSystem, lanes: Int[np.ndarray, " lanes"] | None = None) -> Plan:
+        """Some lanes of a model, on one axis `lane`; or all of them, over the axes of the grid."""
+        some = np.arange(self.size) if lanes is None else lanes
+        values, start = self.at(some)
         speed = values.pop(SPEED)
         if values:
             given = {name: jnp.asarray(x) for name, x in values.items()}
-            designs = eqx.filter_vmap(lambda own: with_values(model, own), axis_size=lanes.size)(given)
-            chosen = Lanes(designs, max(lanes.size, 2), np.arange(lanes.size), speed)
+            designs = eqx.filter_vmap(lambda own: with_values(model, own), axis_size=some.size)(given)
+            chosen = Lanes(designs, max(some.size, 2), np.arange(some.size), speed)
         else:
             chosen = Lanes.of([model], speed)
-        every = chosen.each(own_states, np.arange(lanes.size))
-        return Plan(chosen, every[np.arange(lanes.size), start], {"lane": lanes.size}, {SPEED: (("lane",), speed)})
-
-    def laid_out(self, found: xr.Dataset) -> xr.Dataset:
-        """A data set of all lanes on one axis, over the axes of the grid; an axis of one speed becomes a coordinate."""
-        shaped = lambda x: ((*self.axes, *x.dims[1:]), x.values.reshape(*self.shape, *x.shape[1:]), x.attrs)
-        kept = {name: x for name, x in found.coords.items() if "lane" not in x.dims}
-        axes = {name: (name, np.asarray(x)) for name, x in self.values.items()}
-        laid = xr.Dataset({str(n): shaped(x) for n, x in found.data_vars.items()}, {**kept, **axes}, found.attrs)
-        return laid.isel({SPEED: 0}) if self.axes.get(SPEED) == 1 else laid
+        states = chosen.each(own_states, np.arange(some.size))[np.arange(some.size), start]
+        if lanes is not None:
+            return Plan(chosen, states, {"lane": some.size}, {SPEED: (("lane",), speed)})
+        return Plan(chosen, states, self.axes, {name: ((name,), np.asarray(x)) for name, x in self.values.items()})
 
     def describe(self) -> dict[str, Any]:
         """Everything that the lanes follow from, by which a store is recognised."""

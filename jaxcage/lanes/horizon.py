@@ -125,26 +125,23 @@ def run_unsettled(run: Run, scale: Float[np.ndarray, "lanes dim"], onward: Onwar
             run, discard=until - done - short, revolutions=short, blocks=1, keep=short, exponents=0
         )
         new = onward(look, lanes, None if seen is None else seen.last[lanes])
-        closed = closing_period(new.strobe, scale[lanes]) > 0
-        strobe = np.full((lanes.size, run.keep, scale.shape[1]), np.nan)
+        nan = lambda *shape, count=lanes.size: np.full((count, *shape), np.nan)
+        closed, strobe = closing_period(new.strobe, scale[lanes]) > 0, nan(run.keep, scale.shape[1])
         strobe[:, run.keep - short :] = new.strobe
-        growth = np.full((lanes.size, run.blocks, run.exponents), np.nan)
-        beside = {
-            n: np.full((lanes.size, run.blocks, getattr(new, n).shape[2]), np.nan) for n in ("integrals", "largest")
-        }
-        new = dataclasses.replace(new, strobe=strobe, growth=growth, doubt=growth[:, 0].copy(), **beside)
-        seen = new if seen is None else _later(seen, lanes, new)
+        nothing = {"growth": nan(run.blocks, run.exponents), "doubt": nan(run.exponents)}
+        new = new._replace(strobe=strobe, integrals=nan(run.blocks, 0), largest=nan(run.blocks, 0), **nothing)
+        if seen is None:
+            seen = new
+        else:
+            _later(seen, lanes, new)
         lanes, done = lanes[~closed & (new.outcome == 0)], until
     assert seen is not None
     if lanes.size:
         align = min(run.block, run.discard) if run.exponents else 0
-        seen = _later(seen, lanes, onward(dataclasses.replace(run, discard=align), lanes, seen.last[lanes]))
+        _later(seen, lanes, onward(dataclasses.replace(run, discard=align), lanes, seen.last[lanes]))
     return seen
 
 
-def _later(seen: Observation, lanes: np.ndarray, new: Observation) -> Observation:
-    """What was seen of all lanes, and of some of them later."""
-    error = seen.error.copy()
-    error[lanes] = np.fmax(error[lanes], new.error)
-    seen.put(lanes, new)
-    return dataclasses.replace(seen, error=error)
+def _later(seen: Observation, lanes: np.ndarray, new: Observation) -> None:
+    """Put what some lanes did later in place of what was seen of them; their error is the largest of both."""
+    seen.put(lanes, new._replace(error=np.fmax(seen.error[lanes], new.error)))

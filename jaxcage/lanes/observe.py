@@ -5,18 +5,21 @@ lanes first.
 """
 
 import dataclasses
+import itertools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int
 
 from ..models import ESCAPE, AbstractForcedSystem
 from ..solve import (
     IMPLICIT,
-    OUTCOMES,
+    INACCURATE,
+    NOT_FINITE,
+    OUTSIDE,
     RETRIES,
     STUCK,
     SURE,
@@ -27,7 +30,6 @@ from ..solve import (
     Lanes,
     March,
     NativeSteps,
-    codes_of,
     cores,
     errors_of_parts,
 )
@@ -46,8 +48,7 @@ Progress = Callable[[int, int], None]
 """Called with lanes done and lanes in all."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Observation:
+class Observation(NamedTuple):
     """What lanes did. A lane that failed is NaN with an outcome."""
 
     outcome: Int[np.ndarray, " lanes"]
@@ -75,18 +76,12 @@ class Observation:
 
     def put(self, lanes: Int[np.ndarray, " some"], new: "Observation") -> None:
         """Put what some lanes did in another run in place of what they did in this one."""
-        for field in dataclasses.fields(self):
-            getattr(self, field.name)[lanes] = getattr(new, field.name)
+        for mine, theirs in zip(self, new, strict=True):
+            mine[lanes] = theirs
 
     def at(self, lanes: Any) -> "Observation":
         """Some of the lanes."""
-        return Observation(*(getattr(self, field.name)[lanes] for field in dataclasses.fields(self)))
-
-
-def joined(parts: list[Observation]) -> Observation:
-    """Lanes of several observations, one after the other."""
-    names = [field.name for field in dataclasses.fields(Observation)]
-    return Observation(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+        return Observation(*(x[lanes] for x in self))
 
 
 def observe(
@@ -104,67 +99,61 @@ def observe(
     settings; whether lanes go on from where another run left them, where they may be as far out as lanes come on their
     way.
     """
-    count, each, done = lanes.speed.size, run.discard + run.revolutions, 0.0
-
-    def report(revolutions: float | int) -> None:
-        nonlocal done
-        done += revolutions / max(each, 1)
-        if progress is not None:
-            progress(min(int(done + 1e-9), count), count)
-
+    count, each = lanes.speed.size, max(run.discard + run.revolutions, 1)
     chosen, limit = run.method if method is None else method, ESCAPE if onward else 1.0
     size = max(1, CHUNK // (1 if lanes.system.samples == 1 else 8))
     parts = []
-    for first in range(0, count, size):
-        some = np.arange(first, min(first + size, count))
-        parts.append(_allowed(_Observer(lanes, run, some, states[some], limit, report), chosen))
-    return joined(parts)
+    for some in np.split(np.arange(count), range(size, count, size)):
+
+        def report(revolutions: float, first: int = int(some[0]), last: int = int(some[-1]) + 1) -> None:
+            if progress is not None:
+                progress(min(first + int(revolutions / each + 1e-9), last), count)
+
+        parts.append(_allowed(_Observer(lanes.at(some), run, states[some], limit, report), chosen))
+    return Observation(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _allowed(observer: "_Observer", method: AbstractMethod) -> Observation:
     """Observe lanes; those with too large an error again with smaller tolerances, and those that take too many or too
     short steps again by an implicit method."""
-    seen, stuck = observer.once(method, np.arange(observer.some.size))
-
-    def again(chosen: AbstractMethod, todo: Int[np.ndarray, " few"]) -> None:
-        found, lost = observer.once(chosen, todo)
-        seen.put(todo, found)
-        stuck[todo] = lost
-
+    seen = observer.once(method, np.arange(observer.lanes.speed.size))
     large = lambda: (seen.error > method.allowed) & (seen.outcome == 0)  # of what was asked for, not of a finer run
+
+    def again(chosen: AbstractMethod, lanes: np.ndarray) -> None:
+        if np.any(lanes):
+            seen.put(np.flatnonzero(lanes), observer.once(chosen, np.flatnonzero(lanes)))
+
     if not observer.averages:
         implicit = [method.implicit] if isinstance(method, NativeSteps) and method.pair != IMPLICIT else []
         for chosen in [method, *implicit]:
-            if chosen is not method and np.any(todo := stuck | large()):
-                again(chosen, np.flatnonzero(todo))
+            if chosen is not method:
+                again(chosen, np.isin(seen.outcome, (STUCK, TOO_MANY)) | large())
             for retry in range(1, RETRIES + 1):
-                todo = np.flatnonzero(large() & ~stuck)
-                if not todo.size:
-                    break
-                again(chosen.finer(retry), todo)
-    seen.outcome[large()] = OUTCOMES.index("inaccurate")
+                again(chosen.finer(retry), large())
+    seen.outcome[large()] = INACCURATE
     lost = seen.outcome != 0
     if observer.averages:  # means of a lane that is inaccurate are reported, with its error
-        lost &= seen.outcome != OUTCOMES.index("inaccurate")
+        lost &= seen.outcome != INACCURATE
     for values in (seen.strobe, seen.growth, seen.last, seen.integrals, seen.largest, seen.place):
         values[lost] = np.nan
     return seen
 
 
+@dataclasses.dataclass
 class _Observer:
     """Some lanes, and how they are observed."""
 
-    def __init__(
-        self,
-        lanes: Lanes,
-        run: Run,
-        some: Int[np.ndarray, " some"],
-        states: Float[np.ndarray, "some dim"],
-        limit: float,
-        report: Callable[[float], None],
-    ):
-        self.lanes, self.run, self.some, self.states, self.limit, self.report = lanes, run, some, states, limit, report
-        self.model = lanes.system
+    lanes: Lanes
+    run: Run
+    states: Float[np.ndarray, "lanes dim"]
+    limit: float
+    """Largest excursion from which a lane may start."""
+    report: Callable[[float], None]
+    done: int = 0
+    """Revolutions of all lanes together."""
+
+    def __post_init__(self):
+        self.model = self.lanes.system
         self.averages = len(self.model.beside) > 0
 
     def _segments(self) -> list[tuple[int, int, bool]]:
@@ -177,24 +166,20 @@ class _Observer:
         cuts = {0, end, pushed if run.exponents else run.discard}
         if self.averages:
             cuts |= {run.discard, *range(run.discard, end, run.block)}
-        ordered = sorted(cuts)
-        return [(a, b, a >= pushed) for a, b in zip(ordered[:-1], ordered[1:], strict=True)]
+        return [(a, b, a >= pushed) for a, b in itertools.pairwise(sorted(cuts))]
 
-    def once(
-        self, method: AbstractMethod, which: Int[np.ndarray, " few"]
-    ) -> tuple[Observation, Bool[np.ndarray, " few"]]:
-        """Observe lanes by one method, and tell which took too many or too short steps."""
-        run, model, some, y0 = self.run, self.model, self.some[which], self.states[which]
-        count, dim, samples, end = which.size, model.dimension, model.samples, run.discard + run.revolutions
+    def once(self, method: AbstractMethod, some: Int[np.ndarray, " some"]) -> Observation:
+        """Observe some lanes by one method."""
+        run, model, y0 = self.run, self.model, self.states[some]
+        count, dim, samples, end = some.size, model.dimension, model.samples, run.discard + run.revolutions
         scale, excursion = self.lanes.begin(some, y0)
-        finite = np.all(np.isfinite(y0), axis=1)
-        outcome = np.where(excursion <= self.limit, 0, OUTCOMES.index("outside"))
-        outcome = np.where(finite, outcome, OUTCOMES.index("not_finite"))
+        outcome = np.where(excursion <= self.limit, 0, OUTSIDE)
+        outcome = np.where(np.all(np.isfinite(y0), axis=1), outcome, NOT_FINITE)
         nan = lambda *shape: np.full((count, *shape), np.nan)
         state = self.lanes.completed(y0)
         units = np.concatenate([scale, np.ones((count, state.shape[1] - dim))], axis=1)
         state = state / units
-        step, stuck, error = nan(), np.zeros(count, dtype=bool), np.zeros(count)
+        step, error = nan(), np.zeros(count)
         tangents = np.tile(start_tangents(dim, run.exponents), (count, 1, 1))
         growth, strobe, peak = nan(run.followed * run.block, run.exponents), nan(run.keep, dim), nan()
         integrals, largest = nan(run.blocks, len(model.beside)), nan(run.blocks, len(model.watched) - 1)
@@ -210,16 +195,16 @@ class _Observer:
             numbers = self.lanes.numbers(engine, some[alive])
             seen = stop == end or (self.averages and begin >= run.discard)
             if begin == 0 or (self.averages and seen):
-                error[alive] = np.maximum(error[alive], self._error(plain, some[alive], state[alive], method))
+                error[alive] = np.maximum(error[alive], self._error(plain, some[alive], state[alive, None], method))
             strobes = (stop - begin) * samples
             held = strobes if self.averages else max(run.keep, min(CHECKED + 1, strobes))
             before, (_, begun) = state[alive], self.lanes.begin(some[alive], (state * units)[alive])
-            ran = engine(
-                numbers, before, strobes, held if seen else 1, method, step=step[alive], threads=cores(),
-                tangents=tangents[alive] if pushed and run.exponents else None, report=self._reporter(stop - begin),
-            )  # fmt: skip
-            state[alive], step[alive], outcome[alive] = ran.state, ran.step, codes_of(ran.mark)
-            stuck[alive] = np.isin(ran.mark, (STUCK, TOO_MANY))
+            report = lambda lanes, length=stop - begin: self.report(self.done + lanes * length)
+            more = {"tangents": tangents[alive]} if pushed and run.exponents else {}
+            more |= {"step": step[alive], "threads": cores(), "report": report}
+            ran = engine(numbers, before, strobes, held if seen else 1, method, **more)
+            self.done += alive.size * (stop - begin)
+            state[alive], step[alive], outcome[alive] = ran.state, ran.step, ran.outcome
             if pushed and run.exponents:
                 tangents[alive] = ran.tangents
                 each = ran.growth.reshape(alive.size, stop - begin, samples, run.exponents).sum(axis=2)
@@ -240,23 +225,15 @@ class _Observer:
             strobe[alive] = ran.strobe[:, held - run.keep :]
             peak[alive] = np.maximum(ran.peak, begun)
             doubt[alive] = self._doubt(engine, numbers, ran, method)
-            error[alive] = np.maximum(error[alive], self._error_of_strobes(plain, some[alive], ran.strobe, method))
+            if held > 1:
+                last_ones = ran.strobe[:, -(CHECKED + 1) :]
+                error[alive] = np.maximum(error[alive], self._error(plain, some[alive], last_ones, method))
         blocks = growth.reshape(count, run.followed, run.block, run.exponents).mean(axis=2)
         last = np.where((outcome == 0)[:, None], state[:, :dim] * scale, np.nan)
         kept = strobe * scale[:, None, :]
         return Observation(
             outcome.astype(np.int32), last, kept, blocks, peak, error, doubt, steps, integrals, largest, place
-        ), stuck
-
-    def _reporter(self, revolutions: int) -> Callable[[int], None]:
-        done = 0
-
-        def tell(lanes_done: int) -> None:
-            nonlocal done
-            self.report((lanes_done - done) * revolutions)
-            done = lanes_done
-
-        return tell
+        )
 
     @staticmethod
     def _doubt(
@@ -274,38 +251,23 @@ class _Observer:
         self,
         engine: Engine | JaxEngine,
         some: Int[np.ndarray, " some"],
-        state: Float[np.ndarray, "some numbers"],
+        states: Float[np.ndarray, "some held numbers"],
         method: AbstractMethod,
     ) -> Float[np.ndarray, " some"]:
-        """Error of a stretch from a state: three times the distance of its end from that by the method's reference.
+        """Largest error of the stretches between states: three times the distance of the end of each from that by the
+        method's reference.
 
-        It is at least the tolerance, which protects against accidental agreement of the two. The stretch is a
-        revolution, or as much of one as two runs can be compared over.
+        It is at least the tolerance, which protects against accidental agreement of the two. A stretch is a revolution,
+        or as much of one as two runs can be compared over; of a single state it is the one that follows.
         """
-        turn, numbers = None, self.lanes.numbers(engine, some)
+        numbers, more = self.lanes.numbers(engine, some), {}
         if self.averages:
-            turn = np.array([self.model.comparable(speed) for speed in self.lanes.speed[some].tolist()])
-        ends = engine(numbers, state, 1, 1, method, turn=turn, threads=cores()).state
-        apart = errors_of_parts(engine, numbers, state, ends, self.model.dimension, method, turn=turn)
-        return np.maximum(np.nan_to_num(apart), getattr(method, "tolerance", 0.0))
-
-    def _error_of_strobes(
-        self,
-        engine: Engine | JaxEngine,
-        some: Int[np.ndarray, " some"],
-        strobe: Float[np.ndarray, "some held dim"],
-        method: AbstractMethod,
-    ) -> Float[np.ndarray, " some"]:
-        """The same of the last revolutions, whose strobe states are known."""
-        pairs = strobe[:, -(CHECKED + 1) :]
-        count = pairs.shape[1] - 1
-        if count < 1:
-            return np.zeros(len(strobe))
-        numbers = self.lanes.numbers(engine, np.repeat(some, count))
-        begins, ends = (x.reshape(-1, pairs.shape[2]) for x in (pairs[:, :-1], pairs[:, 1:]))
-        apart = errors_of_parts(engine, numbers, begins, ends, pairs.shape[2], method)
-        worst = np.max(np.nan_to_num(apart.reshape(-1, count)), axis=1)
-        return np.maximum(worst, getattr(method, "tolerance", 0.0))
+            more["turn"] = np.array([self.model.comparable(speed) for speed in self.lanes.speed[some].tolist()])
+        if states.shape[1] == 1:
+            ends = engine(numbers, states[:, 0], 1, 1, method, threads=cores(), **more).state
+            states = np.stack([states[:, 0], ends], axis=1)
+        apart = errors_of_parts(engine, numbers, states, self.model.dimension, method, **more)
+        return np.maximum(np.max(np.nan_to_num(apart), axis=1), getattr(method, "tolerance", 0.0))
 
 
 def centres_of(

@@ -10,9 +10,9 @@ from jaxtyping import Float
 from .._arguments import require_x64
 from ..analysis import label_lanes, motion_label
 from ..models import INSTEAD, AbstractForcedSystem, require_known
-from ..solve import OUTCOMES, AbstractMethod
-from .confirm import Confirmation, Labelled, confirm as confirm_lanes, doubtful
-from .dataset import Found, dataset, exponent_error
+from ..solve import FINISHED, INACCURATE
+from .confirm import Labelled, confirm
+from .dataset import dataset, exponent_error
 from .horizon import follow, run_unsettled
 from .observe import Observation, Progress, observe
 from .plan import Plan, Speeds, States
@@ -34,39 +34,30 @@ def run_lanes(plan: Plan, run: Run, progress: Progress | None = None) -> xr.Data
         return observe(plan.lanes.at(some), run, begin, progress, onward=y is not None, **more)
 
     seen = run_unsettled(run, scale, onward) if run.settled else onward(run, np.arange(len(scale)), None)
-    rounds: tuple[Confirmation, ...] = ()
-    escape, end = None, 0
     if plan.model.samples > 1:
-        label = _motion_labels(seen, plan.model.samples)
-        return dataset(Found(plan, run, seen, scale, label))
+        lost = ~np.isin(seen.outcome, (FINISHED, INACCURATE))
+        label = np.where(lost, "failed", np.array([motion_label(x, plan.model.samples) for x in seen.place]))
+        return dataset(plan, run, seen, scale, label)
+    rounds, escape, end = [], None, 0
     if run.exponents and run.blocks > 1:  # without an error of the exponent no lane is called chaotic
         if run.confirm:
 
             def again(lanes: np.ndarray, times: int) -> Labelled:
                 seen.put(lanes, onward(run, lanes, None, method=run.method.finer(times)))
-                return labelled(seen.at(lanes), scale[lanes])
+                return _labelled(seen.at(lanes), scale[lanes])
 
-            every = labelled(seen, scale)
-            rounds = confirm_lanes(doubtful(every.label.reshape(plan.shape)), every, again)
+            rounds = confirm(_labelled(seen, scale), plan.shape, again)
         if run.horizon > run.discard + run.revolutions:
-            escape, end = follow(labelled(seen, scale).label, seen, run, scale, onward)
-    return dataset(Found(plan, run, seen, scale, labelled(seen, scale).label, escape, end, rounds))
+            escape, end = follow(_labelled(seen, scale).label, seen, run, scale, onward)
+    return dataset(plan, run, seen, scale, _labelled(seen, scale).label, rounds, escape, end)
 
 
-def labelled(seen: Observation, scale: Float[np.ndarray, "lanes dim"]) -> Labelled:
+def _labelled(seen: Observation, scale: Float[np.ndarray, "lanes dim"]) -> Labelled:
     """Labels of lanes while they were observed, with the largest exponent and its standard error."""
-    unknown = np.full(len(scale), np.nan)
-    exponent, error = unknown, unknown
+    exponent = error = np.full(len(scale), np.nan)
     if seen.growth.shape[2]:
         exponent, error = seen.growth.mean(axis=1)[:, 0], exponent_error(seen)[:, 0]
     return Labelled(label_lanes(seen.outcome, seen.strobe, scale, exponent, error), exponent, error)
-
-
-def _motion_labels(seen: Observation, samples: int) -> np.ndarray:
-    """Names of the motion of the cage's centre."""
-    lost = ~np.isin(seen.outcome, [OUTCOMES.index(name) for name in ("successful", "inaccurate")])
-    labels = [motion_label(x, samples) for x in seen.place]
-    return np.where(lost, "failed", np.array(labels))
 
 
 def sweep(
@@ -74,17 +65,8 @@ def sweep(
     speeds: Speeds,
     *,
     starts: States = None,
-    discard: int | None = None,
-    revolutions: int | None = None,
-    blocks: int | None = None,
-    exponents: int | None = None,
-    keep: int | None = None,
-    confirm: bool | None = None,
-    horizon: int | None = None,
-    settled: int | None = None,
-    tolerance: float | None = None,
-    method: AbstractMethod | None = None,
     progress: Progress | None = None,
+    **settings: Any,
 ) -> xr.Dataset:
     """Run a model over speed from several initial states: strobe states, Lyapunov exponents, labels; of a whole bearing
     slips, forces, losses and wear.
@@ -96,9 +78,9 @@ def sweep(
         from revolutions per minute.
     - `starts`: initial states, each a tuple of numbers, or an array with states of its own for each speed; or how many
         of the model's own; by default all of these.
-    - `tolerance`: of machine code, relative to state and scale; `method`: any integration method instead.
-    - the rest: fields of `jaxcage.lanes.Run`, which names their defaults.
     - `progress`: called with lanes done and lanes in all.
+    - `settings`: fields of `jaxcage.lanes.Run`, which names their defaults, such as `discard`, `revolutions`, `blocks`,
+        `exponents`, `confirm`, `horizon` and `method`; or the `tolerance` of machine code, relative to state and scale.
 
     **Returns:** a data set over `speed` and `start` (of several designs over `design` too), with the labels, exponents
     and quantities of every lane. Lanes that fail are NaN with an outcome.
@@ -109,17 +91,4 @@ def sweep(
     require_x64()
     require_known("sweep", INSTEAD, model, speeds)
     plan = Plan.over_speed(model, speeds, starts)
-    run = Run.of(
-        plan.model,
-        discard=discard,
-        revolutions=revolutions,
-        blocks=blocks,
-        exponents=exponents,
-        keep=keep,
-        confirm=confirm,
-        horizon=horizon,
-        settled=settled,
-        tolerance=tolerance,
-        method=method,
-    )
-    return run_lanes(plan, run, progress)
+    return run_lanes(plan, Run.of(plan.model, **settings), progress)

@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Any
 
-from .._arguments import require_at_least
+from .._arguments import check_call, require_at_least
 from .._errors import ArgumentError
 from ..analysis import LONGEST_PERIOD
 from ..models import AbstractForcedSystem
@@ -50,6 +50,7 @@ class Run:
         accuracy = {name: chosen.pop(name) for name in ("tolerance", "error") if name in chosen}
         if chosen.get("method") is None:
             chosen["method"] = native(**accuracy)
+        check_call(cls, **chosen)
         run = cls(**chosen)
         run = dataclasses.replace(run, keep=min(run.keep, run.revolutions))
         run._check(model)

@@ -11,15 +11,15 @@ import equinox as eqx
 import jax
 import numpy as np
 import xarray as xr
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
 from ..analysis import LONGEST_PERIOD, scatter
 from ..models import AbstractForcedSystem, require_speeds
 from ..quantities import quantity
-from .dataset import CODES, configuration_of, settings_of
-from .grid import LANES, Grid, Spread
+from .dataset import CODES, coded, configuration_of, settings_of
+from .grid import LANES, Between, Grid
 from .observe import Progress
 from .plan import SPEED
 from .run import run_lanes
@@ -31,12 +31,10 @@ CLOSING = 2 * LONGEST_PERIOD
 """Strobe states over which orbits are seen to close."""
 
 
-Vary = Mapping[str, Float[Array, " values"] | Float[np.ndarray, " values"] | Spread]
+Vary = Mapping[str, Float[Array, " values"] | Float[np.ndarray, " values"] | Between]
 """Parameter, or `"speed"` or `"oil"` -> values that make an axis of the grid [SI], or how to sample it."""
 Shard = tuple[int, int]
 """(i, n): the i-th of n parts, counted from 1."""
-KNOWN = "jaxcage jax jaxlib numpy diffrax equinox lineax optimistix builtins".split()
-"""Packages whose code is known by their versions."""
 SCALARS = ("peak", "error", "steps")
 """Numbers that every lane has, whatever its model reports."""
 
@@ -59,7 +57,9 @@ class Study:
     def description(self) -> str:
         """All that a store is recognised by, as JSON."""
         run = {f.name: getattr(self.run, f.name) for f in dataclasses.fields(self.run) if f.name != "method"}
-        about = {"name": self.name, "version": self.version, "system": _described(self.model)}
+        configured = configuration_of(self.model)
+        system = json.loads(configured["configuration"]) if configured else numbers_of(self.model)
+        about = {"name": self.name, "version": self.version, "system": system}
         method = {"method_numbers": numbers_of(self.run.method), **settings_of(self.run.method)}
         return json.dumps({**about, "plan": self.grid.describe(), **run, **method}, sort_keys=True)
 
@@ -69,42 +69,20 @@ class Study:
         known = lambda name: (quantity(name).text, quantity(name).unit)
         found = {name: Variable(*known(name)) for name in SCALARS}
         if self.run.exponents:
-            found["exponents"] = Variable(*known("exponent"), within=("exponent",))
-            found["standard_error"] = Variable(*known("standard_error"), within=("exponent",))
+            found["exponents"] = Variable(*known("exponent"), exponents=True)
+            found["standard_error"] = Variable(*known("standard_error"), exponents=True)
         for each in self.model.quantities:
             found[each.name] = Variable(each.text, each.unit)
             found[f"{each.name}_standard_error"] = Variable(f"standard error, {each.text}", each.unit)
-        return found | {name: Variable(*known(name), kind="int8", names=words) for name, words in CODES.items()}
-
-    @property
-    def within(self) -> dict[str, np.ndarray]:
-        """Axes within a lane, with their coordinates."""
-        return {"exponent": np.arange(1, self.run.exponents + 1)}
-
-    @property
-    def own_code(self) -> str | None:
-        """A class or function of the user's own that lanes are computed by, None if there is none."""
-        return _own_code([self.model, self.run.method])
+        return found | {name: Variable(*known(name), names=words) for name, words in CODES.items()}
 
     def chunk(self, number: int) -> Results:
-        """The results of a chunk, laid out as its block of the grid."""
-        found = self.at(self.grid.lanes_of(number))
+        """The results of a chunk, laid out as its block of the grid; the bits of a lane are the same in any company."""
+        found = coded(run_lanes(self.grid.plan(self.model, self.grid.lanes_of(number)), self.run))
+        values = {name: x.values for name, x in found.data_vars.items()}
+        values |= {f"{x.name}_standard_error": scatter(values[f"{x.name}_blocks"]) for x in self.model.quantities}
         shape = tuple(part.stop - part.start for part in self.grid.region(number))
-        return {name: x.reshape(*shape, *x.shape[1:]) for name, x in found.items()}
-
-    def at(self, lanes: Int[np.ndarray, " lanes"]) -> Results:
-        """The results of any lanes, by their numbers; the bits are the same whatever their company."""
-        found = run_lanes(self.grid.plan(self.model, lanes), self.run)
-        results: Results = {}
-        for name, variable in self.variables.items():
-            if name in CODES:
-                results[name] = np.array([CODES[name].index(word) for word in found[name].values], dtype=np.int8)
-            elif name.endswith("_standard_error"):
-                results[name] = scatter(found[f"{name.removesuffix('_standard_error')}_blocks"].values)
-            else:
-                results[name] = found[name].values
-            results[name] = results[name].astype(variable.kind)
-        return results
+        return {name: values[name].reshape(*shape, *values[name].shape[1:]) for name in self.variables}
 
 
 def study(
@@ -130,8 +108,9 @@ def study(
     **Arguments:**
 
     - `model`: a cage, a whole bearing or a system of one's own.
-    - `vary`: what is varied. Arrays are axes of a grid [SI]; `Between` and `Tolerance` are sampled together. The speed
-        [rad/s] must be among them, of a whole bearing the shaft's; `oil` is the ISO VG grade of a mineral oil.
+    - `vary`: what is varied. Arrays are axes of a grid [SI]; those that are `jaxcage.lanes.Between` are sampled
+        together. The speed [rad/s] must be among them, of a whole bearing the shaft's; `oil` is the ISO VG grade of a
+        mineral oil.
     - `store`: the folder.
     - `samples`, `seed`: number of samples (a scrambled Sobol sequence; best a power of 2) and seed.
     - `starts`: how many of the model's own initial states are run at each point, by default all.
@@ -147,7 +126,7 @@ def study(
     **Raises:** `ValueError` for arguments that do not fit together, and for a store of another study.
     """
     require_x64()
-    sampled: dict[str, Spread] = {each: how for each, how in vary.items() if isinstance(how, Spread)}
+    sampled: dict[str, Between] = {each: how for each, how in vary.items() if isinstance(how, Between)}
     axes = {each: np.asarray(x, dtype=float) for each, x in vary.items() if each not in sampled}
     own = len(model.starts(1.0)) if starts is None else starts
     most = lanes or (LANES if model.samples == 1 else LANES // 42)
@@ -169,15 +148,14 @@ def run_study(
         raise ArgumentError("shard", said=f"must be (i, n) with i from 1 to n, but ({i}, {n}) was given.")
     store = Store(path, about)
     part = range(about.grid.chunks)[i - 1 :: n]
-    mine, pending = set(part), store.pending(part)
-    size = {chunk: about.grid.lanes_of(chunk).size for chunk in mine}
-    done, total = sum(size[c] for c in mine - set(pending)), sum(size.values())
-    report = progress or (lambda done, total: None)
-    report(done, total)
+    pending, report = store.pending(part), progress or (lambda done, total: None)
+    lanes = lambda chunks: sum(about.grid.lanes_of(chunk).size for chunk in chunks)
+    total, left = lanes(part), lanes(pending)
+    report(total - left, total)
     for chunk in pending:
         store.write(chunk, about.chunk(chunk))
-        done += size[chunk]
-        report(done, total)
+        left -= lanes([chunk])
+        report(total - left, total)
     if not store.pending():
         store.tidy()
 
@@ -229,27 +207,18 @@ def label_map(
     require_at_least(0, persist=persist)
     if persist and (persist <= run.discard or run.exponents < 1 or run.blocks < 2):
         allowed = f"0 or above the {run.discard} revolutions discarded, with an exponent and 2 blocks"
-        said = f"must be {allowed}, but is {persist}."
-        raise ArgumentError("persist", said=said)
+        raise ArgumentError("persist", said=f"must be {allowed}, but is {persist}.")
 
     def say(what: str) -> Progress | None:
         return None if stage is None else functools.partial(stage, what)
 
-    every = np.arange(grid.size)
-    found = run_lanes(grid.plan(model, every), run, say(f"{grid.size} lanes"))
-    again = every[found["label"].values == "chaotic"] if persist else every[:0]
-    if again.size:
+    found = run_lanes(grid.plan(model), run, say(f"{grid.size} lanes"))
+    if persist and (again := np.flatnonzero(found["label"].values.ravel() == "chaotic")).size:
         longer = dataclasses.replace(run, discard=persist)
         later = run_lanes(grid.plan(model, again), longer, say(f"{again.size} chaotic lanes again"))
-        for name in found.data_vars:
-            found[name].values[again] = later[name].values
-    return grid.laid_out(found)
-
-
-def _described(model: AbstractForcedSystem) -> Any:
-    """The configuration of a model, else its numbers."""
-    found = configuration_of(model)
-    return numbers_of(model) if found is None else found
+        for name, all_lanes in found.data_vars.items():
+            all_lanes.values.reshape(grid.size, *all_lanes.shape[len(grid.shape) :])[again] = later[name].values
+    return found if speed is None else found.isel({SPEED: 0})
 
 
 def numbers_of(module: eqx.Module) -> dict[str, Any]:
@@ -257,15 +226,3 @@ def numbers_of(module: eqx.Module) -> dict[str, Any]:
     leaves, _ = jax.tree_util.tree_flatten_with_path(module)
     named = lambda path: jax.tree_util.keystr(path).lstrip(".")
     return {named(path): np.asarray(x).tolist() for path, x in leaves if eqx.is_array_like(x)}
-
-
-def _own_code(x: Any) -> str | None:
-    """The first class or function in a tree that belongs neither to this package nor to one that it is built on."""
-    if isinstance(x, tuple | list | dict):
-        parts = list(x.values() if isinstance(x, dict) else x)
-    else:
-        module = getattr(x, "__module__", None) or type(x).__module__
-        if module.partition(".")[0] not in KNOWN:
-            return getattr(x, "__name__", type(x).__name__)
-        parts = [getattr(x, f.name, None) for f in dataclasses.fields(x)] if dataclasses.is_dataclass(x) else []
-    return next(filter(None, map(_own_code, parts)), None)

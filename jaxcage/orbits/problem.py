@@ -25,7 +25,7 @@ from jaxtyping import Array, Float, Int
 from .._parameters import Parameter as Parameter, pick as pick
 from .._pytrees import Scalar
 from ..models import AbstractForcedSystem
-from ..solve import AbstractMethod, FixedSteps, StrobeMap, method as make_method, pushed, strobe_map
+from ..solve import AbstractMethod, FixedSteps, StrobeMap, method as make_method, strobe_map
 
 
 SPEED = "speed"
@@ -142,7 +142,7 @@ class OrbitProblem(eqx.Module):
 
         def once(_: Array, carry: tuple) -> tuple:
             y, tangents = carry
-            moved = pushed(strobe, y, tangents, along)
+            moved = strobe(y, list(zip(tangents, along, strict=True)))
             return moved.y, moved.tangents
 
         y, tangents = jax.lax.fori_loop(0, self.periods, once, start)

@@ -27,58 +27,36 @@ from .engine import (
     SURE as SURE,
     Engine as Engine,
     Lanes as Lanes,
-    alike as alike,
     cores as cores,
     engine_of as engine_of,
     errors_of_parts as errors_of_parts,
     histories as histories,
 )
-from .ir import UnknownOperation as UnknownOperation, say_once as say_once
+from .ir import say_once as say_once
 from .jax_engine import JaxEngine as JaxEngine
 from .kernel import REVOLUTION as REVOLUTION
-from .layout import PAIRS as PAIRS
-from .loop import (
-    DIVERGED as DIVERGED,
-    FINISHED as FINISHED,
-    NOT_FINITE as NOT_FINITE,
-    OUTSIDE as OUTSIDE,
-    STUCK as STUCK,
-    TOO_MANY as TOO_MANY,
-)
-from .march import march as march, march_with_tangents as march_with_tangents, with_tangents as with_tangents
+from .march import march as march
 from .method import (
-    DEFAULT_ERROR as DEFAULT_ERROR,
     IMPLICIT as IMPLICIT,
     AbstractMethod as AbstractMethod,
-    AdaptiveSteps as AdaptiveSteps,
     FixedSteps as FixedSteps,
-    Moved as Moved,
     NativeSteps as NativeSteps,
-    Stretch as Stretch,
     method as method,
     native as native,
 )
 from .outcomes import (
+    FINISHED as FINISHED,
+    INACCURATE as INACCURATE,
+    NOT_FINITE as NOT_FINITE,
     OUTCOMES as OUTCOMES,
-    RESULTS as RESULTS,
+    OUTSIDE as OUTSIDE,
+    STUCK as STUCK,
+    TOO_MANY as TOO_MANY,
     March as March,
-    codes_of as codes_of,
-    outcome_code as outcome_code,
 )
-from .simulate import (
-    Trajectory as Trajectory,
-    ramp as ramp,
-    simulate as simulate,
-)
-from .solvers import (
-    ClassicalRK4 as ClassicalRK4,
-    Rodas4 as Rodas4,
-    rosenbrock_step as rosenbrock_step,
-)
-from .strobe_map import StrobeMap as StrobeMap, pushed as pushed, strobe_map as strobe_map
+from .simulate import Trajectory as Trajectory, ramp as ramp, simulate as simulate
+from .solvers import Rodas4 as Rodas4, rosenbrock_step as rosenbrock_step
+from .strobe_map import StrobeMap as StrobeMap, strobe_map as strobe_map
 
 
-check_layer(
-    globals(),
-    "method native ramp simulate strobe_map",
-)
+check_layer(globals(), "method native ramp simulate strobe_map")

@@ -4,13 +4,13 @@
 none. Both take and return the same arrays.
 """
 
+import concurrent.futures
 import copy
 import ctypes
 import functools
 import os
-import threading
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -21,7 +21,7 @@ from jaxtyping import Array, Float, Int
 from .._errors import ArgumentError
 from .._pytrees import Form, compiled, split
 from ..models import AbstractForcedSystem
-from .fields import SAMPLED, LaneNumbers, Numbers, room_for, traced_field
+from .fields import SAMPLED, numbers_at, shape_of_numbers, traced_field
 from .ir import UnknownOperation, say_once
 from .jax_engine import JaxEngine
 from .layout import REVOLUTION, Tableau, layout_of
@@ -47,6 +47,16 @@ CHUNK = 4096
 """Lanes that are run at a time, where a strobe state is kept of each sample."""
 
 
+class LaneNumbers(NamedTuple):
+    """The numbers of a field in each lane."""
+
+    wide: Float[np.ndarray, "wide lanes"]
+    """Those that differ from lane to lane."""
+    shared: Float[np.ndarray, " shared"]
+    slow: Float[np.ndarray, " lanes"]
+    """Factor of the most steps (`AbstractForcedSystem.slowness`)."""
+
+
 class Engine:
     """The compiled revolutions of a model, with a number of tangent vectors."""
 
@@ -64,8 +74,9 @@ class Engine:
         **Raises:** `UnknownOperation` for a law with an operation that has no translation, or arrays of numbers.
         """
         tableau = Tableau.named(pair)
-        self.numbers, self._samples, self._pair, self._order = Numbers(system, several), samples, pair, tableau.order
-        self.field = traced_field(system, self.numbers.form, self.numbers.wide, tangents, samples > 1, tableau.implicit)
+        self._samples, self._pair, self._order = samples, pair, tableau.order
+        form, self._wide = shape_of_numbers(system, several)
+        self.field = traced_field(system, form, self._wide, tangents, samples > 1, tableau.implicit)
         self._rows = layout_of(self.field, len(tableau.phase))
         longest = min(system.steps.longest, REVOLUTION / (2 * system.harmonics))
         self._limits, self._compiled = system.steps._replace(longest=longest), functools.cache(self._march_of)
@@ -76,6 +87,13 @@ class Engine:
         whole, place = ctypes.c_int64, ctypes.c_void_p
         kind = ctypes.CFUNCTYPE(None, place, whole, whole, whole, *[place] * 6)
         return kind(function(march_ir(self.field, self._pair, width), "march"))
+
+    def numbers(self, lanes: "Lanes") -> LaneNumbers:
+        """The numbers of the field in each lane."""
+        found, slow = lanes.each(numbers_at, np.arange(lanes.speed.size))
+        wide = np.array([x for x, w in zip(found, self._wide, strict=True) if w])
+        shared = np.array([x[0] for x, w in zip(found, self._wide, strict=True) if not w], dtype=float)
+        return LaneNumbers(wide.reshape(-1, lanes.speed.size), shared, slow)
 
     @staticmethod
     def picked(numbers: Any, lanes: Any) -> Any:
@@ -109,7 +127,7 @@ class Engine:
         n, moving = field.dimension, field.moving
         limits, more = self._limits, max(1.0, MOST_AT / method.tolerance) ** (1 / self._order)
         most = limits.most * float(np.max(numbers.slow)) * more
-        loaded = np.zeros((rows.end("fixed"), lanes))
+        loaded = np.zeros((rows["first_step"].stop, lanes))
         loaded[:n], loaded[moving - field.beside : moving] = state[:, :n].T, state[:, n:].T
         if field.tangents:
             assert tangents is not None
@@ -117,11 +135,11 @@ class Engine:
         given = np.broadcast_to(np.nan if step is None else step, lanes)
         loaded[rows["step"][0]] = np.where(np.isnan(given), limits.first, given)
         loaded[rows["peak"]] = 0.0 if field.excursion is not None else -np.inf
-        wide = loaded[rows.end("mark") :]
+        wide = loaded[rows["fixed"].start : rows["fixed"].stop]
         if field.own_turn:
             wide[0], wide[1] = REVOLUTION / self._samples if turn is None else turn, begin
         wide[SAMPLED * field.own_turn :] = numbers.wide
-        stored = np.zeros((rows.end("mark"), lanes))
+        stored = np.zeros((rows["mark"].stop, lanes))
         strobe = np.full((lanes, keep, field.recorded), np.nan)
         growth = np.full((lanes, strobes, field.tangents), np.nan)
         queue = np.zeros(2, dtype=np.int64)
@@ -147,7 +165,7 @@ class Engine:
             step=part("step"),
             peaks=peaks,
             steps=part("steps"),
-            mark=part("mark"),
+            outcome=part("mark").astype(int) - 1,
             strobe=turned[..., :numbers_of],
             growth=grown,
         )
@@ -155,19 +173,15 @@ class Engine:
 
 def _run_threads(run: Callable[[], None], count: int, queue: np.ndarray, report: Callable[[], None]) -> None:
     """`run` in threads of its own, interrupted by Ctrl-C within a moment: the flag in `queue` empties it."""
-    pool = [threading.Thread(target=run, daemon=True) for _ in range(count)]
-    try:
-        for each in pool:
-            each.start()
-        for each in pool:
-            while each.is_alive():
-                each.join(WAKES)
+    with concurrent.futures.ThreadPoolExecutor(count) as pool:
+        try:
+            left = {pool.submit(run) for _ in range(count)}
+            while left:
+                left = concurrent.futures.wait(left, WAKES).not_done
                 report()
-    except BaseException:
-        queue[1] = 1
-        for each in pool:
-            each.join()
-        raise
+        except BaseException:
+            queue[1] = 1
+            raise
 
 
 _engines: dict[Any, Engine | JaxEngine] = {}
@@ -200,22 +214,14 @@ def has_implicit(system: AbstractForcedSystem) -> bool:
     return system.dimension <= LARGEST_WRITTEN_OUT and not system.beside
 
 
-def alike(designs: Sequence[Any], name: str, kind: str) -> list[Any]:
-    """Designs with all numbers as arrays: a parameter may be a Python number in one and an array in another.
-
-    **Raises:** `ValueError` for designs that differ in more than their numbers.
-    """
-    number = lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x
-    found = [jax.tree.map(number, design) for design in designs]
-    rests = [eqx.filter(design, eqx.is_array, inverse=True) for design in found]
-    if any(not eqx.tree_equal(rest, rests[0]) for rest in rests):
-        raise ArgumentError(name, said=f"must hold {kind} that differ in their numbers only.")
-    return found
-
-
 def cores() -> int:
     """Processor cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+
+
+def _in_arrays(design: Any) -> Any:
+    """A design with all numbers as arrays: one may be a Python number in one design and an array in another."""
+    return jax.tree.map(lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x, design)
 
 
 class Lanes:
@@ -229,11 +235,10 @@ class Lanes:
         speed: Float[np.ndarray, " lanes"],
     ):
         """`designs` is a system, or `count` of them with their arrays stacked."""
-        number = lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x
-        self.form, rows = split(jax.tree.map(number, designs), eqx.is_inexact_array)
+        self.form, rows = split(_in_arrays(designs), eqx.is_inexact_array)
         self.several, self.which, self.speed = count > 1, which, speed
         self._rows = [np.asarray(x) for x in rows]
-        self._every, self._place = (which, speed), np.arange(speed.size)
+        self._all, self._place = self, np.arange(speed.size)
         self._numbers: dict[type, Any] = {}
 
     @classmethod
@@ -247,8 +252,12 @@ class Lanes:
         which = np.zeros(speed.size, int) if which is None else which
         if len(systems) == 1:
             return cls(systems[0], 1, which, speed)
+        found = [_in_arrays(system) for system in systems]
+        rests = [eqx.filter(system, eqx.is_array, inverse=True) for system in found]
+        if any(not eqx.tree_equal(rest, rests[0]) for rest in rests):
+            raise ArgumentError("systems", said="must hold systems that differ in their numbers only.")
         stacked = lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0]
-        return cls(jax.tree.map(stacked, *alike(systems, "systems", "systems")), len(systems), which, speed)
+        return cls(jax.tree.map(stacked, *found), len(systems), which, speed)
 
     def at(self, some: Int[np.ndarray, " some"]) -> "Lanes":
         """Some of the lanes."""
@@ -268,9 +277,7 @@ class Lanes:
     def numbers(self, engine: Engine | JaxEngine, some: Int[np.ndarray, " some"]) -> Any:
         """The numbers of some lanes as the engine takes them; they are worked out once for all lanes."""
         if type(engine) not in self._numbers:
-            which, speed = self._every
-            rows = [x[which] for x in self._rows] if self.several else self._rows
-            self._numbers[type(engine)] = engine.numbers(speed, rows)
+            self._numbers[type(engine)] = engine.numbers(self._all)
         return engine.picked(self._numbers[type(engine)], self._place[some])
 
     def engine(self, tangents: int, method: AbstractMethod, samples: int = 1) -> Engine | JaxEngine:
@@ -286,19 +293,19 @@ class Lanes:
         self, some: Int[np.ndarray, " some"], y: Float[np.ndarray, "some numbers"]
     ) -> tuple[Float[np.ndarray, "some numbers"], Float[np.ndarray, " some"]]:
         """Scale of each of some lanes, 1 for what is integrated beside the state, and excursion of its state."""
-        count, dim = some.size, self.system.dimension
-        room = room_for(count)
-        filled = np.concatenate([some, np.broadcast_to(some[-1:], room - count)])
-        states = np.concatenate([y[:, :dim], np.broadcast_to(y[-1:, :dim], (room - count, dim))])
-        scale, excursion = self.each(_scale_and_excursion, filled, states)
-        ones = np.ones((count, y.shape[1] - dim))
-        return np.concatenate([scale[:count], ones], axis=1), excursion[:count]
+        dim = self.system.dimension
+        scale, excursion = self.each(_scale_and_excursion, some, y[:, :dim])
+        return np.concatenate([scale, np.ones((some.size, y.shape[1] - dim))], axis=1), excursion
 
     def each(self, f: Callable[..., Any], some: Int[np.ndarray, " some"], *arrays: np.ndarray) -> Any:
-        """`f(model, speed, ...)` of some lanes, a function of a module; arrays have the lanes first."""
-        rows = [jnp.asarray(x) for x in self.rows(some)]
-        given = [jnp.asarray(x) for x in (self.speed[some], *arrays)]
-        return jax.tree.map(np.asarray, _mapped(f, self.form, self.several, rows, *given))
+        """`f(model, speed, ...)` of some lanes, a function of a module; arrays have the lanes first. It is compiled for
+        few numbers of lanes, the powers of 8."""
+        room = 8 ** max(1, -(-(some.size - 1).bit_length() // 3))
+        filled = lambda x: np.concatenate([x, np.broadcast_to(x[-1:], (room - some.size, *x.shape[1:]))])
+        rows = [jnp.asarray(x) for x in self.rows(filled(some))]
+        given = [jnp.asarray(filled(x)) for x in (self.speed[some], *arrays)]
+        found = _mapped(f, self.form, self.several, rows, *given)
+        return jax.tree.map(lambda x: np.asarray(x)[: some.size], found)
 
 
 @compiled
@@ -325,52 +332,46 @@ def histories(
     """States of lanes at so many phases of each of some revolutions, the first where they begin, in SI units; and the
     largest error of a revolution [scale]. NaN where one begins nowhere, or fails. A lane whose error is larger than the
     method allows is run again with finer steps."""
-    seen, error = _histories(lanes, y0, samples, revolutions, method)
-    for retry in range(1, RETRIES + 1):
+    total, size = samples * revolutions, CHUNK // samples + 1
+    seen, error = np.full((lanes.speed.size, total, y0.shape[1]), np.nan), np.full(lanes.speed.size, np.nan)
+    todo = np.flatnonzero(np.all(np.isfinite(y0), axis=1))
+    for retry in range(1 + RETRIES):
+        chosen = method.finer(retry)
+        for some in np.split(todo, range(size, todo.size, size)) if todo.size else ():
+            scale, _ = lanes.begin(some, y0[some])
+            engine = lanes.engine(0, chosen, samples)
+            numbers = lanes.numbers(engine, some)
+            ran = engine(numbers, y0[some] / scale, total, total, chosen, threads=cores())
+            states = np.concatenate([(y0[some] / scale)[:, None], ran.strobe], axis=1)
+            begin = np.tile(np.arange(total) % samples, some.size)
+            apart = errors_of_parts(engine, numbers, states, lanes.system.dimension, chosen, begin=begin)
+            error[some] = errors_of_stretches(apart, samples, chosen).max(axis=1)
+            seen[some] = states[:, :-1] * scale[:, None, :]
         todo = np.flatnonzero(error > method.allowed)
-        if not todo.size:
-            break
-        seen[todo], error[todo] = _histories(lanes.at(todo), y0[todo], samples, revolutions, method.finer(retry))
-    return seen, error
-
-
-def _histories(
-    lanes: Lanes, y0: Float[np.ndarray, "lanes dim"], samples: int, revolutions: int, method: AbstractMethod
-) -> tuple[Float[np.ndarray, "lanes samples dim"], Float[np.ndarray, " lanes"]]:
-    """The same by one method."""
-    count, total = lanes.speed.size, samples * revolutions
-    seen, error = np.full((count, total, y0.shape[1]), np.nan), np.full(count, np.nan)
-    for first in range(0, count, CHUNK // samples + 1):
-        some = np.arange(first, min(first + CHUNK // samples + 1, count))
-        some = some[np.all(np.isfinite(y0[some]), axis=1)]
-        if not some.size:
-            continue
-        scale, _ = lanes.begin(some, y0[some])
-        engine = lanes.engine(0, method, samples)
-        numbers = lanes.numbers(engine, some)
-        ran = engine(numbers, y0[some] / scale, total, total, method, threads=cores())
-        states = np.concatenate([(y0[some] / scale)[:, None], ran.strobe], axis=1)
-        repeated, begin = np.repeat(np.arange(some.size), total), np.tile(np.arange(total) % samples, some.size)
-        begins, ends = (x.reshape(repeated.size, -1) for x in (states[:, :-1], states[:, 1:]))
-        dim, given = lanes.system.dimension, engine.picked(numbers, repeated)
-        apart = errors_of_parts(engine, given, begins, ends, dim, method, begin=begin).reshape(some.size, total)
-        error[some] = errors_of_stretches(apart, samples, method).max(axis=1)
-        seen[some] = states[:, :-1] * scale[:, None, :]
     return seen, error
 
 
 def errors_of_parts(
     engine: Engine | JaxEngine,
     numbers: Any,
-    begins: Float[np.ndarray, "parts numbers"],
-    ends: Float[np.ndarray, "parts numbers"],
+    states: Float[np.ndarray, "lanes states numbers"],
     dimension: int,
     method: AbstractMethod,
     **more: Any,
-) -> Float[np.ndarray, " parts"]:
-    """Error of each part of a run [scale]: three times the distance of its end from that by the method's reference."""
-    sharper = engine(numbers, begins, 1, 1, method.reference, threads=cores(), **more).state
-    return SURE * np.max(np.abs(sharper - ends)[:, :dimension], axis=1)
+) -> Float[np.ndarray, "lanes parts"]:
+    """Error of each part of a run [scale]: three times the distance of its end from that by the method's reference.
+
+    **Arguments:** engine; numbers of the lanes; states [scale] from part to part; dimension; method of the run; more
+    for the engine, of each part.
+    """
+    count, parts = states.shape[0], states.shape[1] - 1
+    begins, given = (
+        states[:, :-1].reshape(count * parts, -1),
+        engine.picked(numbers, np.repeat(np.arange(count), parts)),
+    )
+    sharper = engine(given, begins, 1, 1, method.reference, threads=cores(), **more).state
+    apart = np.abs(sharper.reshape(count, parts, -1) - states[:, 1:])
+    return SURE * np.max(apart[..., :dimension], axis=2)
 
 
 def errors_of_stretches(

@@ -1,14 +1,12 @@
 """Programs of a model for the integration loop, traced in JAX: its rates, excursion and steps, and their numbers."""
 
-import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from .._pytrees import Form, split
 from ..forces import cos_sin
@@ -26,8 +24,8 @@ from ..models import (
     multiply,
 )
 from .ir import Code, UnknownOperation, Value, is_variable, number
-from .layout import Field, Layout, fixed_numbers
-from .program import Program, Sizes, program_of
+from .layout import Field, Layout, fixed_numbers, rates_arguments
+from .program import Program, Sizes, following, needed, program_of
 from .solvers import rosenbrock_step
 
 
@@ -37,74 +35,23 @@ SAMPLED = 2
 PASSED, NORMAL = len(Passed._fields), Passed._fields.index("normal")
 
 
-@dataclasses.dataclass(frozen=True)
-class _Rates:
-    """Rates of a state and of tangent vectors, in units of the scale."""
-
-    form: Form
-    dimension: int
-    tangents: int
-    skip: int
-    """Fixed numbers that are not the law's."""
-
-    def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
-        field, _, scale = self.form.filled(fixed[self.skip :])
-        n = self.dimension
-        go = lambda y: tuple(jnp.asarray(c, float) for c in ScaledField(field, scale)(phase, y))
-        if not self.tangents:
-            return go(moved), ()
-        pushed = [jax.jvp(go, (moved[:n],), (moved[i : i + n],)) for i in range(n, len(moved), n)]
-        return (*pushed[0][0], *(c for _, each in pushed for c in each)), ()
+def _traced(f: Callable[[Any, Any, Any], Any], moved: int, fixed: int) -> Program:
+    """The program of a function of (phase, what moves, fixed numbers)."""
+    return program_of(lambda phase, moved, _, fixed: (f(phase, moved, fixed), ()), Sizes(moved, 0, fixed))
 
 
-@dataclasses.dataclass(frozen=True)
-class _Step:
-    """A step of the Rosenbrock method and its estimated error, in units of the scale: moved are its length, the state
-    and tangent vectors."""
-
-    form: Form
-    dimension: int
-    tangents: int
-    skip: int
-
-    def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
-        field, _, scale = self.form.filled(fixed[self.skip :])
-        n, (h, *rest) = self.dimension, moved
-
-        def go(y: Any) -> Any:
-            y1, error, *_ = rosenbrock_step(ScaledField(field, scale), phase, lambda _: h, y)
-            return tuple(jnp.asarray(c, float) for c in (*y1, *error))
-
-        y = tuple(rest[:n])
-        values = go(y)
-        pushed = [jax.jvp(go, (y,), (tuple(rest[i : i + n]),))[1] for i in range(n, len(rest), n)]
-        ends = (*values[:n], *(c for each in pushed for c in each[:n]))
-        return (*ends, *values[n:], *(c for each in pushed for c in each[n:])), ()
+def _floats(numbers: Any) -> tuple[Any, ...]:
+    return tuple(jnp.asarray(x, dtype=float) for x in numbers)
 
 
-@dataclasses.dataclass(frozen=True)
-class _Excursion:
-    """How far a state, in units of the scale, is towards the edge of what the model holds for."""
-
-    form: Form
-    skip: int
-
-    def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
-        _, system, scale = self.form.filled(fixed[self.skip :])
-        return (system.excursion(multiply(moved, scale)),), ()
-
-
-@dataclasses.dataclass(frozen=True)
-class _Abrupt:
-    """Distance of a state from an abrupt change of the law, and the speed with which it comes there."""
-
-    form: Form
-    skip: int
-
-    def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
-        _, system, scale = self.form.filled(fixed[self.skip :])
-        n = len(moved) // 2
-        return system.abrupt(multiply(moved[:n], scale), multiply(moved[n:], scale)), ()
+def _with_tangents(go: Callable[[Any], Any], numbers: Any, size: int, tangents: int) -> tuple[Any, ...]:
+    """Values of `go`, their tangents along the vectors behind the first `size` numbers, and what is seen."""
+    y, out = tuple(numbers[:size]), []
+    values, seen = go(y)
+    for k in range(1, 1 + tangents):
+        along = tuple(numbers[k * size : (k + 1) * size])
+        out += jax.jvp(lambda y: go(y)[0], (y,), (along,))[1]
+    return (*values, *out, *seen)
 
 
 def _hoisted(program: Program, moving: int) -> tuple[Program, Program]:
@@ -124,16 +71,11 @@ def _hoisted(program: Program, moving: int) -> tuple[Program, Program]:
             late = [e, *late]
             wanted |= {v for v in e.invars if is_variable(v)}
         else:
-            numbers.append(e)
-    made = [v for e in reversed(numbers) for v in e.outvars if v in wanted]
-    needed, first = set(made), []
-    for e in numbers:
-        if needed & set(e.outvars):
-            first.append(e)
-            needed |= {v for v in e.invars if is_variable(v)}
-    prelude = jaxpr.replace(invars=jaxpr.invars[1 + moving :], eqns=first[::-1], outvars=made)
+            numbers.insert(0, e)
+    made = [v for e in numbers for v in e.outvars if v in wanted]
+    prelude = jaxpr.replace(invars=jaxpr.invars[1 + moving :], eqns=needed(numbers, made), outvars=made)
     rest = jaxpr.replace(invars=[*jaxpr.invars, *made], eqns=late)
-    return Program(prelude, program.consts, []), Program(rest, program.consts, [])
+    return Program(prelude, program.consts), Program(rest, program.consts)
 
 
 def _pieces(system: AbstractForcedSystem, speed: Any) -> tuple[Form, list[Any]]:
@@ -146,53 +88,24 @@ def _pieces(system: AbstractForcedSystem, speed: Any) -> tuple[Form, list[Any]]:
     return split((field, system, scale), eqx.is_inexact_array)
 
 
-def room_for(lanes: int) -> int:
-    """The next power of 8: programs inside JAX are compiled for few numbers of lanes."""
-    return 8 ** max(1, -(-(lanes - 1).bit_length() // 3))
+def numbers_at(system: AbstractForcedSystem, speed: Any) -> tuple[list[Any], Any]:
+    """The numbers of the field at a speed, and the factor of the most steps (`AbstractForcedSystem.slowness`)."""
+    return _pieces(system, speed)[1], system.slowness(speed)
 
 
-class LaneNumbers(NamedTuple):
-    """The numbers of a field in each lane."""
+def shape_of_numbers(system: AbstractForcedSystem, several: bool) -> tuple[Form, tuple[bool, ...]]:
+    """The form of field, system and scale, and which of their numbers differ from lane to lane: those that follow from
+    the speed, or all of `several` designs.
 
-    wide: Float[np.ndarray, "wide lanes"]
-    """Those that differ from lane to lane."""
-    shared: Float[np.ndarray, " shared"]
-    slow: Float[np.ndarray, " lanes"]
-    """Factor of the most steps (`AbstractForcedSystem.slowness`)."""
-
-
-class Numbers:
-    """The numbers of a field, as they follow from a system's and a speed."""
-
-    def __init__(self, system: AbstractForcedSystem, several: bool):
-        self._form, row = split(system, eqx.is_inexact_array)
-        self.several = several
-        self.form = _pieces(system, jnp.asarray(1.0))[0]
-
-        def of(speed: Any, row: Sequence[Any]) -> list[Any]:
-            return [jnp.asarray(x, float) for x in _pieces(self._form.filled(row), speed)[1]]
-
-        traced = jax.make_jaxpr(lambda speed: of(speed, row))(1.0).jaxpr
-        if any(v.aval.shape for v in traced.outvars):
-            raise UnknownOperation("array")
-        moved = set(traced.invars)
-        for e in traced.eqns:
-            if any(is_variable(v) and v in moved for v in e.invars):
-                moved.update(e.outvars)
-        self.wide = tuple(several or (is_variable(v) and v in moved) for v in traced.outvars)
-        both = lambda speed, row: (of(speed, row), jnp.asarray(self._form.filled(row).slowness(speed), float))
-        self._over = jax.jit(lambda speeds, rows: jax.vmap(both, in_axes=(0, 0 if several else None))(speeds, rows))
-
-    def __call__(self, speeds: Float[np.ndarray, " lanes"], rows: Sequence[Any]) -> LaneNumbers:
-        """The numbers of lanes at these speeds, with the numbers of their designs."""
-        count = len(speeds)
-        room = room_for(count)
-        pad = lambda x: np.concatenate([x, np.broadcast_to(x[-1:], (room - count, *x.shape[1:]))])
-        filled = [pad(np.asarray(x)) for x in rows] if self.several else list(rows)
-        found, slow = jax.tree.map(np.asarray, self._over(pad(speeds), filled))
-        wide = [x[:count] for x, w in zip(found, self.wide, strict=True) if w]
-        shared = [x[0] for x, w in zip(found, self.wide, strict=True) if not w]
-        return LaneNumbers(np.array(wide).reshape(len(wide), count), np.array(shared, dtype=float), slow[:count])
+    **Raises:** `UnknownOperation` for arrays of numbers.
+    """
+    traced = jax.make_jaxpr(lambda speed: _floats(_pieces(system, speed)[1]))(1.0).jaxpr
+    if any(v.aval.shape for v in traced.outvars):
+        raise UnknownOperation("array")
+    moved = following(traced.eqns, traced.invars)
+    return _pieces(system, jnp.asarray(1.0))[0], tuple(
+        several or (is_variable(v) and v in moved) for v in traced.outvars
+    )
 
 
 def traced_field(
@@ -206,95 +119,47 @@ def traced_field(
     """The programs of a system, with a strobe state for each revolution or, if it is `sampled`, several."""
     if system.beside:
         return bearing_field(form, (True,) * SAMPLED + wide, system.dimension, tangents)
-    n, skip = system.dimension, SAMPLED * sampled
+    n, skip, moving = system.dimension, SAMPLED * sampled, system.dimension * (1 + tangents)
     wide = (True,) * skip + wide
-    trace = lambda step, moving: program_of(step, Sizes(moving, 0, len(wide)))
-    prelude, rates = _hoisted(trace(_Rates(form, n, tangents, skip), n * (1 + tangents)), n * (1 + tangents))
+    pieces = lambda fixed: form.filled(fixed[skip:])
+
+    def rates(phase: Any, moved: Any, fixed: Any) -> Any:
+        """Rates of a state and of tangent vectors, in units of the scale."""
+        field, _, scale = pieces(fixed)
+        go = lambda y: _floats(ScaledField(field, scale)(phase, y))
+        if not tangents:
+            return go(moved)
+        pushed = [jax.jvp(go, (moved[:n],), (moved[i : i + n],)) for i in range(n, moving, n)]
+        return (*pushed[0][0], *(c for _, each in pushed for c in each))
+
+    def step(phase: Any, moved: Any, fixed: Any) -> Any:
+        """A step of the Rosenbrock method, in units of the scale: moved are its length, the state and tangent vectors;
+        results are the same at its end, and their estimated errors."""
+        (field, _, scale), (h, *y) = pieces(fixed), moved
+
+        def go(y: Any) -> Any:
+            y1, error, *_ = rosenbrock_step(ScaledField(field, scale), phase, lambda _: h, y)
+            return _floats((*y1, *error)), ()
+
+        found = _with_tangents(go, y, n, tangents)
+        halves = [found[i : i + n] for i in range(0, 2 * moving, n)]
+        return [c for half in (*halves[::2], *halves[1::2]) for c in half]
+
+    def excursion(_: Any, moved: Any, fixed: Any) -> Any:
+        _, system, scale = pieces(fixed)
+        return (system.excursion(multiply(moved, scale)),)
+
+    def abrupt(_: Any, moved: Any, fixed: Any) -> Any:
+        _, system, scale = pieces(fixed)
+        return system.abrupt(multiply(moved[:n], scale), multiply(moved[n:], scale))
+
+    trace = lambda f, moved: _traced(f, moved, len(wide))
+    prelude, late = _hoisted(trace(rates, moving), moving)
     ones = tuple(jnp.ones(()) for _ in range(n))
-    abrupt = None if system.abrupt(ones, ones) is None else trace(_Abrupt(form, skip), 2 * n)
-    step = trace(_Step(form, n, tangents, skip), 1 + n * (1 + tangents)) if implicit else None
-    return Field(
-        prelude, rates, trace(_Excursion(form, skip), n), abrupt, n, tangents, wide, step=step, own_turn=sampled,
-        phased=sampled,
-    )  # fmt: skip
-
-
-@dataclasses.dataclass(frozen=True)
-class _Roller:
-    """Rates of a roller, and what it passes on to the bodies.
-
-    Moved are cosine and sine of the pocket's angle in the cage, those of the cage's angle, the numbers of the roller
-    and the bodies, and the tangents of both. Results are rates and the first `MOVING` of `Passed`, the tangents of
-    these, the rest of `Passed`, and the slip.
-    """
-
-    form: Form
-    tangents: int
-
-    def __call__(self, i: Any, moved: Any, watched: Any, fixed: Any) -> Any:
-        (cos_j, sin_j, cos, sin), numbers = moved[:4], moved[4:]
-        at, _, units = self.form.filled(fixed[SAMPLED:])
-        pocket = cos * cos_j - sin * sin_j, sin * cos_j + cos * sin_j
-        size = OF_ROLLER + OF_BODIES
-
-        def go(y: Any) -> tuple[Any, Any]:
-            y = [a * u for a, u in zip(y, units, strict=True)]
-            rollers, cage = Rollers(*y[:OF_ROLLER]), Bodies(*y[OF_ROLLER:])
-            rates, passed = at.roller_rates(rollers, cage, at.on_roller(rollers, cage, *pocket))
-            pace = at.pace(cage.cage_speed)
-            rates = [pace * x / u for x, u in zip(rates, units, strict=False)]
-            return _floats((*rates, *passed[:MOVING])), _floats((*passed[MOVING:], at.slip(rollers.spin)))
-
-        return _with_tangents(go, numbers, size, self.tangents), ()
-
-
-@dataclasses.dataclass(frozen=True)
-class _Bodies:
-    """Rates of cage and ring, of the quantities beside the state, and what is watched.
-
-    Moved are cosine and sine of the cage's angle, the numbers of the bodies and the sums over all rollers that move
-    them, the tangents of both, the other sums, and the largest pocket force and slip.
-    """
-
-    form: Form
-    tangents: int
-
-    def __call__(self, i: Any, moved: Any, watched: Any, fixed: Any) -> Any:
-        (cos, sin), numbers = moved[:2], moved[2:]
-        at, _, scale = self.form.filled(fixed[SAMPLED:])
-        units = scale[OF_ROLLER:]
-        size = OF_BODIES + MOVING
-        numbers, rest, (normal, slip) = (
-            numbers[: size * (1 + self.tangents)],
-            numbers[size * (1 + self.tangents) : -2],
-            numbers[-2:],
-        )
-
-        def go(y: Any) -> tuple[Any, Any]:
-            cage = Bodies(*(a * u for a, u in zip(y, units, strict=False)))
-            land = at.on_land(cage)
-            rates, integrals = at.body_rates(cage, (cos, sin), Passed(*y[OF_BODIES:], *rest), land)
-            pace = at.pace(cage.cage_speed)
-            rates = [pace * x / u for x, u in zip(rates, units, strict=True)]
-            beside = [pace * x for x in (cage.cage_speed, 1.0, *integrals)]
-            lost = at.lost(cage.cage_speed, land.eps)
-            return _floats(rates), _floats((*beside, lost, normal, land.size, slip, land.eps))
-
-        return _with_tangents(go, numbers, size, self.tangents), ()
-
-
-def _floats(numbers: Any) -> tuple[Any, ...]:
-    return tuple(jnp.asarray(x, dtype=float) for x in numbers)
-
-
-def _with_tangents(go: Callable[[Any], Any], numbers: Any, size: int, tangents: int) -> tuple[Any, ...]:
-    """Values of `go`, their tangents along the vectors behind the first `size` numbers, and what is seen."""
-    y, out = tuple(numbers[:size]), []
-    values, seen = go(y)
-    for k in range(1, 1 + tangents):
-        along = tuple(numbers[k * size : (k + 1) * size])
-        out += jax.jvp(lambda y: go(y)[0], (y,), (along,))[1]
-    return (*values, *out, *seen)
+    near = None if system.abrupt(ones, ones) is None else trace(abrupt, 2 * n)
+    own_step = trace(step, 1 + moving) if implicit else None
+    programs = prelude, late, trace(excursion, n), near
+    return Field(*programs, n, tangents, wide, own_step, own_turn=sampled, phased=sampled)
 
 
 class RollersCode(NamedTuple):
@@ -313,7 +178,7 @@ class RollersCode(NamedTuple):
         load = lambda first, count: [w.get(first + k, base="%place") for k in range(count)]
         own = [load(z * OF_ROLLER + size * t, OF_BODIES) for t in range(1 + tangents)]
         phase = w.get(size * (1 + tangents), base="%place")
-        (cos, sin), w.block = w.program(self.angle, [number(0.0), phase], w.block)
+        cos, sin = w.program(self.angle, [number(0.0), phase])
         places = 2 * np.pi / z * np.arange(z)
         table = ", ".join(f"double {number(x).text}" for pair in zip(np.cos(places), np.sin(places)) for x in pair)
         # Of values and of tangents MOVING sums each, then the other sums, then the largest force and slip.
@@ -335,7 +200,7 @@ class RollersCode(NamedTuple):
             numbers += [w.get(row(size * t + k), base="%place") for k in range(OF_ROLLER)] + own[t]
         arguments = [number(0.0), *place, cos, sin, *numbers]
         fixed = fixed_numbers(w, field, rows, self.roller, len(arguments))
-        results, w.block = w.program(self.roller, [*arguments, *fixed], w.block)
+        results = w.program(self.roller, [*arguments, *fixed])
         rates, passed = [], []
         for t in range(1 + tangents):
             part = results[t * (OF_ROLLER + MOVING) : (t + 1) * (OF_ROLLER + MOVING)]
@@ -368,33 +233,71 @@ class RollersCode(NamedTuple):
             numbers += own[t] + new[t * MOVING : (t + 1) * MOVING]
         arguments = [number(0.0), cos, sin, *numbers, *new[moving:]]
         fixed = fixed_numbers(w, field, rows, self.bodies, len(arguments))
-        results, w.block = w.program(self.bodies, [*arguments, *fixed], w.block)
+        results = w.program(self.bodies, [*arguments, *fixed])
         for t in range(1 + tangents):
             for k in range(OF_BODIES):
                 w.put(size * t + z * OF_ROLLER + k, results[t * OF_BODIES + k], base="%out")
         for k, x in enumerate(results[(1 + tangents) * OF_BODIES :]):
             w.put(size * (1 + tangents) + k, x, base="%out")
-        head = (
-            f"@places = internal constant [{2 * z} x double] [{table}]\n"
-            f"define internal void @rates({vector} %phase, ptr noalias %place, ptr noalias %memory, "
-            "ptr noalias %shared, ptr noalias %out) noinline {\nentry:\n"
-        )
-        return head + w.taken() + "\n  ret void\n}\n", w.declarations
+        text, declarations = w.function("rates", rates_arguments(w))
+        return f"@places = internal constant [{2 * z} x double] [{table}]\n{text}", declarations
 
 
 def bearing_field(form: Form, wide: tuple[bool, ...], dimension: int, tangents: int) -> Field:
     """The programs of a whole bearing: the forces on a roller are traced once, as a function of that roller, cage and
     ring; the code runs it for each roller in turn and adds up what the rollers pass on."""
+
+    def roller(_: Any, moved: Any, fixed: Any) -> Any:
+        """Rates of a roller, and what it passes on to the bodies.
+
+        Moved are cosine and sine of the pocket's angle in the cage, those of the cage's angle, the numbers of the
+        roller and the bodies, and the tangents of both. Results are rates and the first `MOVING` of `Passed`, the
+        tangents of these, the rest of `Passed`, and the slip.
+        """
+        (cos_j, sin_j, cos, sin), numbers = moved[:4], moved[4:]
+        at, _, units = form.filled(fixed[SAMPLED:])
+        pocket = cos * cos_j - sin * sin_j, sin * cos_j + cos * sin_j
+
+        def go(y: Any) -> tuple[Any, Any]:
+            y = [a * u for a, u in zip(y, units, strict=True)]
+            rollers, cage = Rollers(*y[:OF_ROLLER]), Bodies(*y[OF_ROLLER:])
+            rates, passed = at.roller_rates(rollers, cage, at.on_roller(rollers, cage, *pocket))
+            pace = at.pace(cage.cage_speed)
+            rates = [pace * x / u for x, u in zip(rates, units, strict=False)]
+            return _floats((*rates, *passed[:MOVING])), _floats((*passed[MOVING:], at.slip(rollers.spin)))
+
+        return _with_tangents(go, numbers, OF_ROLLER + OF_BODIES, tangents)
+
+    def bodies(_: Any, moved: Any, fixed: Any) -> Any:
+        """Rates of cage and ring, of the quantities beside the state, and what is watched.
+
+        Moved are cosine and sine of the cage's angle, the numbers of the bodies and the sums over all rollers that move
+        them, the tangents of both, the other sums, and the largest pocket force and slip.
+        """
+        (cos, sin), numbers, (normal, slip) = moved[:2], moved[2:-2], moved[-2:]
+        at, _, scale = form.filled(fixed[SAMPLED:])
+        units, size = scale[OF_ROLLER:], OF_BODIES + MOVING
+        rest = numbers[size * (1 + tangents) :]
+
+        def go(y: Any) -> tuple[Any, Any]:
+            cage = Bodies(*(a * u for a, u in zip(y, units, strict=False)))
+            land = at.on_land(cage)
+            rates, integrals = at.body_rates(cage, (cos, sin), Passed(*y[OF_BODIES:], *rest), land)
+            pace = at.pace(cage.cage_speed)
+            rates = [pace * x / u for x, u in zip(rates, units, strict=True)]
+            beside = [pace * x for x in (cage.cage_speed, 1.0, *integrals)]
+            lost = at.lost(cage.cage_speed, land.eps)
+            return _floats(rates), _floats((*beside, lost, normal, land.size, slip, land.eps))
+
+        return _with_tangents(go, numbers, size, tangents)
+
     at, *_ = form.filled([1.0] * (len(wide) - SAMPLED))
-    trace = lambda step, moved: program_of(step, Sizes(moved, 0, len(wide)))
-    cosine = lambda i, moved, watched, fixed: (cos_sin(moved[0]), ())
-    rollers = RollersCode(
+    trace = lambda f, moved: _traced(f, moved, len(wide))
+    code = RollersCode(
         at.n_rollers,
-        trace(_Roller(form, tangents), 4 + (OF_ROLLER + OF_BODIES) * (1 + tangents)),
-        trace(_Bodies(form, tangents), 2 + (OF_BODIES + MOVING) * (1 + tangents) + PASSED - MOVING + 2),
-        program_of(cosine, Sizes(1, 0, 0)),
+        trace(roller, 4 + (OF_ROLLER + OF_BODIES) * (1 + tangents)),
+        trace(bodies, 2 + (OF_BODIES + MOVING) * (1 + tangents) + PASSED - MOVING + 2),
+        _traced(lambda _, moved, fixed: cos_sin(moved[0]), 1, 0),
     )
-    return Field(
-        None, rollers, None, None, dimension, tangents, wide, beside=len(BESIDE), watched=len(WATCHED), own_turn=True,
-        relative=False, careful=False,
-    )  # fmt: skip
+    more = {"beside": len(BESIDE), "watched": len(WATCHED), "own_turn": True, "relative": False, "careful": False}
+    return Field(None, code, None, None, dimension, tangents, wide, **more)

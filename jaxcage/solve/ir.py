@@ -25,34 +25,10 @@ COST = {"div": 6, "sqrt": 6, "rsqrt": 6, "exp": 20, "log": 20, "sin": 20, "cos":
 """Operations that count as several."""
 ARITHMETIC = {"add": "add", "add_any": "add", "sub": "sub", "mul": "mul", "div": "div", "rem": "rem"}
 COMPARISONS = {"lt": "lt", "le": "le", "gt": "gt", "ge": "ge", "eq": "eq", "ne": "ne"}
-BITWISE = {
-    "and": "and",
-    "or": "or",
-    "xor": "xor",
-    "shift_left": "shl",
-    "shift_right_logical": "lshr",
-    "shift_right_arithmetic": "ashr",
-}
-SAME_NAME = (
-    "sqrt",
-    "floor",
-    "ceil",
-    "exp",
-    "exp2",
-    "log",
-    "log2",
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "atan2",
-)
-INTRINSICS = {
-    **{name: name for name in (*SAME_NAME, "sinh", "cosh", "tanh", "pow", "copysign")},
-    "abs": "fabs",
-}
+SHIFTS = {"shift_left": "shl", "shift_right_logical": "lshr", "shift_right_arithmetic": "ashr"}
+BITWISE = {"and": "and", "or": "or", "xor": "xor", **SHIFTS}
+SAME_NAME = "sqrt floor ceil exp exp2 log log2 sin cos tan asin acos atan atan2 sinh cosh tanh pow copysign".split()
+INTRINSICS = {**dict(zip(SAME_NAME, SAME_NAME)), "abs": "fabs"}
 CASTS = {("double", "i64"): "fptosi", ("i64", "double"): "sitofp", ("i1", "double"): "uitofp", ("i1", "i64"): "zext"}
 
 WRITTEN_OUT = 48
@@ -157,8 +133,14 @@ def number(x: Any) -> Value:
     return Value(f"0x{struct.unpack('<Q', struct.pack('<d', float(x)))[0]:016X}", "double", False)
 
 
-class Writer:
-    """Lines of a function's body. An operation is one on vectors where any of its operands is a vector."""
+class Code:
+    """Lines of a function's body. An operation is one on vectors where any of its operands is a vector.
+
+    Vectors are kept in rows of memory. A row is a number, or a value within a loop over rows.
+    """
+
+    block = "entry"
+    """The block that is being written."""
 
     def __init__(self, width: int):
         self.width, self.lines, self.names, self.declarations = width, [], 0, set[str]()
@@ -171,6 +153,8 @@ class Writer:
 
     def line(self, text: str) -> None:
         self.lines.append(text if text.endswith(":") else f"  {text}")
+        if text.endswith(":"):
+            self.block = text[:-1]
 
     def let(self, text: str, kind: str, wide: bool) -> Value:
         self.names += 1
@@ -340,14 +324,14 @@ class Writer:
                 return self.convert(cast, x[0], kind)
         raise UnknownOperation(name)
 
-    def program(self, program: Any, arguments: Sequence[Value], block: str) -> tuple[list[Value], str]:
-        """The results of a traced function, and the name of the block in which its code ends."""
+    def program(self, program: Any, arguments: Sequence[Value]) -> list[Value]:
+        """The results of a traced function."""
         jaxpr = program.jaxpr
         known: dict[Any, Value] = dict(zip(jaxpr.invars, arguments, strict=True))
         known |= {v: number(c) for v, c in zip(jaxpr.constvars, program.consts, strict=True)}
         read = lambda atom: known[atom] if is_variable(atom) else number(atom.val)
         for path, equations in in_groups(jaxpr.eqns, branches(jaxpr.eqns, jaxpr.outvars)):
-            before = after = block
+            before = block = after = self.block
             if path:
                 some = self.any(self.both(*(known[m] if side else self.negated(known[m]) for m, side in path)))
                 self.names += 1
@@ -363,25 +347,17 @@ class Writer:
                     v = known[e.outvars[0]]
                     merged = f"phi {self.type(v.kind, v.wide)} [ {v.text}, %{block} ], [ poison, %{before} ]"
                     known[e.outvars[0]] = self.let(merged, v.kind, v.wide)
-                block = after
-        return [read(v) for v in jaxpr.outvars], block
+        return [read(v) for v in jaxpr.outvars]
 
     def taken(self) -> str:
         """The lines written since the last call."""
         lines, self.lines = self.lines, []
         return "\n".join(lines)
 
-
-class Code(Writer):
-    """A writer of code that keeps vectors in rows of memory. A row is a number, or a value within a loop over rows."""
-
-    block = "entry"
-    """The block that is being written."""
-
-    def line(self, text: str) -> None:
-        super().line(text)
-        if text.endswith(":"):
-            self.block = text[:-1]
+    def function(self, name: str, arguments: str) -> tuple[str, set[str]]:
+        """The lines written as a function, and what it needs declared."""
+        head = f"define internal void @{name}({arguments}) noinline {{\nentry:\n"
+        return f"{head}{self.taken()}\n  ret void\n}}\n", self.declarations
 
     def at(self, row: int | Value, base: str = "%memory") -> Value:
         if isinstance(row, Value):

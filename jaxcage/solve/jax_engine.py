@@ -2,7 +2,7 @@
 
 import concurrent.futures
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
 import jax
@@ -12,10 +12,13 @@ from jaxtyping import Array, Float, Int
 
 from .._pytrees import Form, compiled, split
 from ..models import AbstractForcedSystem, divide, multiply
-from .method import REVOLUTION, AbstractMethod, moved_by
-from .outcomes import MARKS, OUTCOMES, March
+from .method import AbstractMethod
+from .outcomes import FINISHED, March
 from .strobe_map import StrobeMap
 
+
+if TYPE_CHECKING:
+    from .engine import Lanes
 
 UNIT, MOST = 8, 256
 """Lanes of a call are a multiple of the first, up to the second: each size is compiled by itself."""
@@ -26,47 +29,40 @@ def _strobe(
     form: Form,
     several: bool,
     method: AbstractMethod,
+    samples: int,
     own: Sequence[Array],
     shared: Sequence[Array],
     y: Float[Array, "lanes numbers"],
     tangents: Float[Array, "lanes tangents dim"],
     i: Int[Array, " lanes"],
-    parts: int | Float[Array, " lanes"],
 ) -> tuple[Array, Array, Array, Array]:
-    """Lanes over the i-th of a number of parts of a revolution, in units of their scales."""
+    """Lanes from the i-th to the next strobe state of a revolution, in units of their scales."""
 
-    def lane(own: Any, y: Array, tangents: Array, i: Array, parts: Any) -> tuple[Array, Array, Array, Array]:
+    def lane(own: Any, y: Array, tangents: Array, i: Array) -> tuple[Array, Array, Array, Array]:
         speed, *numbers = own
         system = form.filled(numbers if several else shared)
-        field, scale = system.at_speed(speed), system.scale(speed)
-        strobe = StrobeMap(field, system, scale, method)
-        state = lambda row: multiply(tuple(row), scale)
-        moved: Any = moved_by(lambda z: strobe.part(z, i, parts), state(y), [state(t) for t in tangents])
-        row = lambda z: jnp.stack(divide(z, scale))
+        scale = system.scale(speed)
+        state, row = lambda z: multiply(tuple(z), scale), lambda z: jnp.stack(divide(z, scale))
+        strobe = StrobeMap(system.at_speed(speed), system, scale, method)
+        moved = strobe.part(state(y), i, samples, [(state(t), None) for t in tangents])
         after = jnp.stack([row(t) for t in moved.tangents]) if moved.tangents else tangents
-        return row(moved.y), after, moved.peak, moved.outcome
+        return row(moved.y), after, jnp.asarray(moved.peak, dtype=float), moved.outcome
 
-    if isinstance(parts, int):
-        return jax.vmap(lambda own, y, tangents, i: lane(own, y, tangents, i, parts))(list(own), y, tangents, i)
-    return jax.vmap(lane)(list(own), y, tangents, i, parts)
+    return jax.vmap(lane)(list(own), y, tangents, i)
 
 
 def _orthonormalised(
     tangents: Float[np.ndarray, "lanes tangents dim"],
 ) -> tuple[Float[np.ndarray, "lanes tangents dim"], Float[np.ndarray, "lanes tangents"]]:
-    """Gram and Schmidt's method, each vector projected twice, and the logarithms of the lengths that are left: of a
-    vector that has turned into those before it, of the rounding."""
-    done, lengths = np.zeros_like(tangents), np.zeros(tangents.shape[:2])
-    for i in range(tangents.shape[1]):
-        u = tangents[:, i]
-        least = np.finfo(float).eps * np.linalg.norm(u, axis=1) + np.finfo(float).tiny
-        for j in [*range(i)] * 2:
-            u = u - np.sum(u * done[:, j], axis=1, keepdims=True) * done[:, j]
-        lengths[:, i] = np.linalg.norm(u, axis=1)
-        lost = lengths[:, i] == 0
-        u, lengths[lost, i] = np.where(lost[:, None], least[:, None], u), least[lost]
-        done[:, i] = u / np.linalg.norm(u, axis=1, keepdims=True)
-    return done, np.log(lengths)
+    """Orthonormal tangent vectors, and the logarithms of the lengths that are left of each beside those before it: of
+    one that has turned into them, of the rounding."""
+    columns = np.swapaxes(tangents, 1, 2)
+    directions, products = np.linalg.qr(columns)
+    length = np.diagonal(products, axis1=1, axis2=2)
+    least = np.finfo(float).eps * np.linalg.norm(columns, axis=1) + np.finfo(float).tiny
+    return np.swapaxes(directions, 1, 2) * np.where(length < 0, -1, 1)[..., None], np.log(
+        np.fmax(np.abs(length), least)
+    )
 
 
 class JaxEngine:
@@ -77,10 +73,10 @@ class JaxEngine:
         self._form, _ = split(system, eqx.is_inexact_array)
         self._several, self._tangents, self._samples = several, tangents, samples
 
-    def numbers(self, speeds: Float[np.ndarray, " lanes"], rows: Sequence[Any]) -> Any:
+    def numbers(self, lanes: "Lanes") -> Any:
         """The numbers that lanes have of their own, and those that all share."""
-        own = [np.asarray(speeds), *(map(np.asarray, rows) if self._several else ())]
-        return own, [] if self._several else [jnp.asarray(x) for x in rows]
+        rows = lanes.rows(np.arange(lanes.speed.size))
+        return ([lanes.speed, *rows], []) if self._several else ([lanes.speed], [jnp.asarray(x) for x in rows])
 
     @staticmethod
     def picked(numbers: Any, lanes: Int[np.ndarray, " some"]) -> Any:
@@ -96,7 +92,6 @@ class JaxEngine:
         method: AbstractMethod,
         *,
         begin: Any = 0,
-        turn: Any = None,
         tangents: Float[np.ndarray, "lanes tangents dim"] | None = None,
         step: Any = None,
         threads: int = 1,
@@ -104,38 +99,34 @@ class JaxEngine:
     ) -> March:
         """Run lanes as `Engine` does; the solver chooses its first step itself."""
         own, shared = numbers
-        lanes, dim = state.shape
-        chosen, y, m = method.in_jax, state.copy(), self._tangents
+        (lanes, dim), y, m = state.shape, state.copy(), self._tangents
         t = np.zeros((lanes, 0, dim)) if tangents is None else tangents.copy()
         strobe, growth = np.full((lanes, keep, dim), np.nan), np.full((lanes, strobes, m), np.nan)
-        mark, peaks, size = np.zeros(lanes), np.zeros(lanes), min(MOST, -(-lanes // (UNIT * threads)) * UNIT)
+        outcome, peaks = np.full(lanes, FINISHED), np.zeros(lanes)
+        size = min(MOST, -(-lanes // (UNIT * threads)) * UNIT)
         first = np.broadcast_to(np.asarray(begin, dtype=int), lanes)
-        parts = None if turn is None else np.broadcast_to(REVOLUTION / np.asarray(turn, dtype=float), lanes)
 
         def chunk(some: Int[np.ndarray, " some"], k: int) -> list[np.ndarray]:
             filled = np.concatenate([some, np.repeat(some[-1:], size - some.size)])
             given = [jnp.asarray(x[filled]) for x in own], shared, jnp.asarray(y[filled]), jnp.asarray(t[filled])
             i = jnp.asarray((first[filled] + k) % self._samples)
-            some_parts = self._samples if parts is None else jnp.asarray(parts[filled])
-            out = _strobe(self._form, self._several, chosen, *given, i, some_parts)
+            out = _strobe(self._form, self._several, method.in_jax, self._samples, *given, i)
             return [np.asarray(x)[: some.size] for x in out]
 
         with concurrent.futures.ThreadPoolExecutor(threads) as pool:
             for k in range(strobes):
-                alive = np.flatnonzero(mark == 0)
+                alive = np.flatnonzero(outcome == FINISHED)
                 if not alive.size:
                     break
                 some = np.split(alive, range(size, alive.size, size))
                 found = list(pool.map(lambda some, k=k: chunk(some, k), some))
-                y1, t1, peak, codes = (np.concatenate(x) for x in zip(*found, strict=True))
-                lost = codes != 0
-                mark[alive[lost]] = [MARKS[OUTCOMES[code]] for code in codes[lost]]
+                y1, t1, peak, outcome[alive] = (np.concatenate(x) for x in zip(*found, strict=True))
                 peaks[alive] = np.maximum(peaks[alive], peak)
-                alive, y1, t1 = alive[~lost], y1[~lost], t1[~lost]
+                well = outcome[alive] == FINISHED
+                alive, y1, t1 = alive[well], y1[well], t1[well]
                 y[alive], strobe[alive, k % keep] = y1, y1
                 if m and alive.size:
                     t[alive], growth[alive, k] = _orthonormalised(t1)
                 report(int(lanes * (k + 1) / strobes))
-        mark[mark == 0] = MARKS["successful"]
         latest_last, none = np.roll(strobe, -strobes % keep, axis=1), np.zeros(lanes)
-        return March(y, t, none, peaks[:, None, None], none, mark, latest_last, growth)
+        return March(y, t, none, peaks[:, None, None], none, outcome, latest_last, growth)

@@ -6,12 +6,13 @@ The numbers of field, system and scale are what is fixed; the rest (structure, t
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import Any, NamedTuple, TypeGuard
+from typing import Any, NamedTuple
 
 import diffrax as dfx
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jaxtyping import Array, Int
 
 from .._pytrees import Form, Scalar, State, split
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, Linearisation
@@ -21,7 +22,11 @@ from .program import Numbers
 from .solvers import Rodas4, explicit_step, rosenbrock_step
 
 
-KernelSolver = Rodas4 | dfx.AbstractERK
+Parts = Int[Array, ""] | Scalar
+"""Number of equal parts of a revolution."""
+Tangents = Sequence[tuple[State, Sequence[Any] | None]]
+"""Tangent vectors in units of the state, each with the tangents of the field's numbers in the order of its leaves, None
+where there are none."""
 
 
 class Pieces(NamedTuple):
@@ -32,7 +37,7 @@ class Pieces(NamedTuple):
     scale: State
 
 
-def can_be_kernel(solver: Any) -> TypeGuard[KernelSolver]:
+def can_be_kernel(solver: Any) -> bool:
     """True if a step of `solver` is a plain formula, as of ours, and of explicit methods whose last stage is kept."""
     if isinstance(solver, dfx.AbstractERK):
         return isinstance(solver.tableau, dfx.ButcherTableau) and solver.tableau.fsal
@@ -49,12 +54,12 @@ MORE = 8
 """Steps are added by so many parts of a revolution's, until all lanes are through."""
 
 
-def shortened(h: Scalar, near: tuple[Scalar, Scalar] | None, phase: Scalar, end: Scalar) -> Scalar:
-    """The step from `phase`, of the size h far from abrupt changes; the last one ends at `end`, and is 0 beyond it.
+def shortened(h: Scalar, near: Any, phase: Scalar, end: Scalar) -> Scalar:
+    """The step from `phase`, of the size h far from abrupt changes, by the distance from the nearest and the speed
+    towards it (`AbstractForcedSystem.abrupt`); the last one ends at `end`, and is 0 beyond it.
 
     It has no derivative: the mesh is what it is while the state on it is differentiated.
     """
-    assert near is not None
     distance, speed = near
     short = h * distance / (distance + NEARNESS * jnp.maximum(speed - distance / FAR, 0.0))
     short = jnp.maximum(short, SHORTEST * h)
@@ -86,7 +91,7 @@ class KernelStep:
     """One step for `march`: moved is the state; watched the largest excursion and, where steps are shortened, the
     phase; fixed the first phase, the step, the phase at the end, and the numbers of (field, system, scale)."""
 
-    solver: KernelSolver
+    solver: Any
     structure: Form
     abrupt: bool
     """True if the law changes abruptly somewhere: steps are shortened there."""
@@ -107,7 +112,6 @@ class KernelStep:
             return shortened(h, system.abrupt(moved, rate), t0, end) if self.abrupt else h
 
         if isinstance(self.solver, dfx.AbstractERK):
-            assert isinstance(self.solver.tableau, dfx.ButcherTableau)
             y, step = explicit_step(self.solver.tableau, field, t0, size, moved)
         else:
             y, _, _, step = rosenbrock_step(field, t0, size, moved)
@@ -118,45 +122,29 @@ class KernelStep:
         return y, (jnp.maximum(peak, jnp.asarray(system.excursion(y))), *clock)  # the maximum keeps a NaN
 
 
-def kernel_step(
-    solver: KernelSolver, field: AbstractField, system: AbstractForcedSystem, scale: State
-) -> tuple[KernelStep, list[Any]]:
-    """A step and its fixed numbers behind phases and step size; system and scale have no derivative."""
-    watching = jax.tree.map(lambda x: jax.lax.stop_gradient(x) if eqx.is_array(x) else x, (system, scale))
-    structure, numbers = split((field, *watching), eqx.is_inexact_array)
-    abrupt = system.abrupt(scale, scale) is not None
-    return KernelStep(solver, structure, abrupt), numbers
-
-
 def steps_through(
-    solver: Any,
-    steps: Any,
-    pieces: Pieces,
-    y: State,
-    tangents: Sequence[State] = (),
-    drifts: Sequence[Sequence[Any] | None] = (),
-    phase: Any = 0.0,
-    parts: Any = 1,
+    solver: Any, steps: Any, pieces: Pieces, y: State, phase: Any, parts: Parts, tangents: Tangents
 ) -> tuple[State, Scalar, tuple[State, ...]]:
     """One `parts`-th of a revolution of `steps` steps, and as many more as abrupt changes of the law ask for.
 
-    **Arguments:** solver; steps of a revolution; what is integrated; state; tangent vectors, and for each of
-    them the tangents of the field's numbers, None where there are none; phase and part.
-
     **Returns:** the state after it, the largest excursion on the way, the tangent vectors.
     """
-    step, numbers = kernel_step(solver, *pieces)
+    field, system, scale = pieces
+    # How far out a state is, and in which units, has no derivative.
+    watching = jax.tree.map(lambda x: jax.lax.stop_gradient(x) if eqx.is_array(x) else x, (system, scale))
+    structure, numbers = split((field, *watching), eqx.is_inexact_array)
+    step = KernelStep(solver, structure, system.abrupt(scale, scale) is not None)
     count, h = steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float)
     end = phase + REVOLUTION / jnp.asarray(parts, dtype=float)
     fixed = (jnp.asarray(phase, dtype=float), h, end, *numbers)
     row = lambda drift: (None, None, None, *(drift or ()), *(None,) * (len(numbers) - len(drift or ())))
-    along = [row(d) for d in drifts]
+    along = [row(drift) for _, drift in tangents]
 
     def go(carry: tuple, count: Any) -> tuple:
         y, watched, tangents = carry
         return march_with_tangents(step, count, y, watched, fixed, tangents, along)
 
-    carry = go((tuple(y), step.watched(phase), tuple(tangents)), count)
+    carry = go((tuple(y), step.watched(phase), tuple(t for t, _ in tangents)), count)
     if step.abrupt:
         more = jnp.maximum(count // MORE, 1)
         # A lane that is lost ends the loop: it is far out, or its phase is NaN.

@@ -1,12 +1,12 @@
 """Inputs of the integration loop: methods, the programs of a model, and the rows of its working memory."""
 
-import dataclasses
+import itertools
 import math
 from typing import Any, NamedTuple
 
 import diffrax as dfx
 
-from .ir import Code, Value, is_variable, number
+from .ir import Code, Value, number
 
 
 REVOLUTION = 2 * math.pi
@@ -20,29 +20,8 @@ PAIRS: dict[str, tuple[type[dfx.AbstractERK] | None, int]] = {
 """Embedded explicit pairs by name, with their order; and an implicit method."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Layout:
-    """Rows of a lane's numbers in the working memory of a vector, by name: first row, number of rows."""
-
-    rows: dict[str, tuple[int, int]]
-
-    @classmethod
-    def of(cls, **sizes: int) -> "Layout":
-        rows, at = {}, 0
-        for name, size in sizes.items():
-            rows[name], at = (at, size), at + size
-        return cls(rows)
-
-    def __getitem__(self, name: str) -> range:
-        return range(self.rows[name][0], self.end(name))
-
-    @property
-    def total(self) -> int:
-        return sum(size for _, size in self.rows.values())
-
-    def end(self, name: str) -> int:
-        """The row after the last one of `name`."""
-        return sum(self.rows[name])
+Layout = dict[str, range]
+"""Rows of a lane's numbers in the working memory of a vector, by name."""
 
 
 class Tableau(NamedTuple):
@@ -123,34 +102,36 @@ class Field(NamedTuple):
 
 
 def layout_of(field: Field, stages: int) -> Layout:
-    """Rows of the working memory: those that are stored when a lane leaves come first, then those that are loaded with
-    it, then those that are set to zero."""
-    return Layout.of(
-        state=field.moving,
-        step=1,
-        peak=field.watched,
-        steps=1,
-        mark=1,
-        fixed=sum(field.wide),
-        phase=1,
-        error=1,
-        revolution=1,
-        first_step=1,
-        lane=1,
-        rate=field.span * stages,
-        stage=field.moving,
-        again=field.span,
-        made=len(field.prelude.jaxpr.outvars) if field.prelude else 0,
-    )
+    """Rows of the working memory: those that are stored when a lane leaves come first, then others that are loaded with
+    the next one, from `fixed` to `first_step`."""
+    sizes = {
+        "state": field.moving,
+        "step": 1,
+        "peak": field.watched,
+        "steps": 1,
+        "mark": 1,
+        "fixed": sum(field.wide),
+        **dict.fromkeys(("phase", "error", "revolution", "first_step", "lane"), 1),
+        "rate": field.span * stages,
+        "stage": field.moving,
+        "again": field.span,
+        "made": len(field.prelude.jaxpr.outvars) if field.prelude else 0,
+    }
+    ends = itertools.accumulate(sizes.values())
+    return {name: range(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
 
 
 def fixed_numbers(w: Code, field: Field, rows: Layout, program: Any, first: int) -> list[Value]:
     """The fixed numbers of a program, which stand behind its first arguments; those that it does not read are 0."""
-    read = [*(v for e in program.jaxpr.eqns for v in e.invars), *program.jaxpr.outvars]
-    used = {v for v in read if is_variable(v)}
-    values, wide_row, shared = [], iter(rows["fixed"]), 0
-    for v, wide in zip(program.jaxpr.invars[first:], field.wide, strict=False):
-        row, at = next(wide_row) if wide else 0, shared
-        shared += not wide
-        values.append((w.get(row) if wide else w.shared(at)) if v in used else number(0.0))
+    used = set(program.needed)
+    values, wide_row, shared = [], iter(rows["fixed"]), itertools.count()
+    for k, wide in zip(range(first, len(program.jaxpr.invars)), field.wide, strict=False):
+        at = next(wide_row if wide else shared)
+        values.append((w.get(at) if wide else w.shared(at)) if k in used else number(0.0))
     return values
+
+
+def rates_arguments(w: Code) -> str:
+    """Arguments of the function of rates."""
+    phase, places = f"{w.type('double', True)} %phase", ("place", "memory", "shared", "out")
+    return ", ".join([phase, *(f"ptr noalias %{name}" for name in places)])

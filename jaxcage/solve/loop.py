@@ -4,7 +4,8 @@ Each lane of a vector has a phase, a step size and a revolution of its own, and 
 or failed; the next lane of a queue, which all threads share, takes its place. Steps are controlled by the estimated
 error (PI controller), in units of the system's scale, and end near places where the law changes abruptly. At the end of
 a revolution the strobe state is stored, and tangent vectors are orthonormalised and their growth stored. What a lane
-does depends neither on its neighbours nor on the number of threads.
+does depends neither on its neighbours nor on the number of threads. The mark of a lane that leaves is the code of its
+outcome plus one.
 """
 
 from typing import Any
@@ -12,14 +13,10 @@ from typing import Any
 import numpy as np
 
 from .ir import Code, Value, is_variable, number
-from .layout import REVOLUTION, Field, Layout, Tableau, fixed_numbers, layout_of
-from .step_control import Tried, limited_step, next_step, squared_error, step_to_strobe
-
-
-FINISHED, OUTSIDE, NOT_FINITE, STUCK, TOO_MANY, DIVERGED = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
-"""Marks of lanes that leave: all revolutions done; far outside what the model holds for; step size below the smallest
-one because the state is not finite, or because the error cannot be met; too many steps in a revolution; an iteration
-that did not converge, which this loop has none of."""
+from .layout import REVOLUTION, Field, Layout, Tableau, fixed_numbers, layout_of, rates_arguments
+from .outcomes import FINISHED, NOT_FINITE, OUTSIDE, STUCK, TOO_MANY
+from .program import following
+from .step_control import limited_step, next_step, squared_error, step_to_strobe
 
 
 def march_ir(field: Field, pair: str, width: int) -> str:
@@ -35,34 +32,27 @@ def march_ir(field: Field, pair: str, width: int) -> str:
     made = [_prelude(field, rows, width)] if field.prelude else []
     rates = field.rates.code(field, rows, width) if hasattr(field.rates, "code") else _rates(field, rows, width)
     implicit = [_implicit(field, rows, width)] if tableau.implicit else []
-    parts = [*made, rates, *implicit, _refill(rows, width), _loop(field, rows, tableau, width)]
+    first = {"mark": rows["mark"][0] * width, "lane": rows["lane"][0] * width}
+    refill = REFILL.format(width=width, n_stored=rows["mark"].stop, n_loaded=rows["first_step"].stop, **first)
+    parts = [*made, rates, *implicit, (refill, set()), _loop(field, rows, tableau, width)]
     declarations = sorted(set().union(*(declared for _, declared in parts)))
     return "\n".join([*(text for text, _ in parts), *declarations, '!0 = !{!"branch_weights", i32 1, i32 30}', ""])
-
-
-def _made(w: Code, field: Field, rows: Layout) -> list[Value]:
-    """Results of the prelude."""
-    return [w.get(row, wide) for row, wide in zip(rows["made"], _made_wide(field), strict=True)]
 
 
 def _made_wide(field: Field) -> list[bool]:
     """Which results of the prelude differ from lane to lane: those that follow from a number that does."""
     jaxpr = field.prelude.jaxpr
-    wide = {v for v, each in zip(jaxpr.invars, field.wide, strict=True) if each}
-    for e in jaxpr.eqns:
-        if any(is_variable(v) and v in wide for v in e.invars):
-            wide.update(e.outvars)
+    wide = following(jaxpr.eqns, [v for v, each in zip(jaxpr.invars, field.wide, strict=True) if each])
     return [is_variable(v) and v in wide for v in jaxpr.outvars]
 
 
 def _prelude(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
     """The code that works out everything that follows from the fixed numbers alone."""
     w = Code(width)
-    results, _ = w.program(field.prelude, fixed_numbers(w, field, rows, field.prelude, 0), "entry")
+    results = w.program(field.prelude, fixed_numbers(w, field, rows, field.prelude, 0))
     for row, wide, v in zip(rows["made"], _made_wide(field), results, strict=True):
         w.put(row, v, wide)
-    head = "define internal void @prelude(ptr noalias %memory, ptr noalias %shared) noinline {\nentry:\n"
-    return head + w.taken() + "\n  ret void\n}\n", w.declarations
+    return w.function("prelude", "ptr noalias %memory, ptr noalias %shared")
 
 
 def _rates(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
@@ -71,14 +61,11 @@ def _rates(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
     moved = [w.get(j, base="%place") for j in range(field.moving)]
     arguments = [Value("%phase", "double", True), *moved]
     fixed = fixed_numbers(w, field, rows, field.rates, len(arguments))
-    results, _ = w.program(field.rates, [*arguments, *fixed, *_made(w, field, rows)], "entry")
+    made = [w.get(row, wide) for row, wide in zip(rows["made"], _made_wide(field), strict=True)]
+    results = w.program(field.rates, [*arguments, *fixed, *made])
     for j, v in enumerate(results):
         w.put(j, v, base="%out")
-    head = (
-        f"define internal void @rates({w.type('double', True)} %phase, ptr noalias %place, ptr noalias %memory, "
-        "ptr noalias %shared, ptr noalias %out) noinline {\nentry:\n"
-    )
-    return head + w.taken() + "\n  ret void\n}\n", w.declarations
+    return w.function("rates", rates_arguments(w))
 
 
 def _implicit(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
@@ -87,19 +74,13 @@ def _implicit(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
     assert field.step is not None
     moved = w.all(rows["state"])
     arguments = [Value("%phase", "double", True), Value("%step", "double", True), *moved]
-    results, _ = w.program(
-        field.step, [*arguments, *fixed_numbers(w, field, rows, field.step, len(arguments))], "entry"
-    )
+    results = w.program(field.step, [*arguments, *fixed_numbers(w, field, rows, field.step, len(arguments))])
     for j, v in enumerate(results[: field.moving]):
         w.put(rows["stage"][0] + j, v)
     for j, v in enumerate(results[field.moving :]):
         w.put(rows["again"][0] + j, v)
     vector = w.type("double", True)
-    head = (
-        f"define internal void @implicit({vector} %phase, {vector} %step, ptr noalias %memory, ptr noalias %shared) "
-        "noinline {\nentry:\n"
-    )
-    return head + w.taken() + "\n  ret void\n}\n", w.declarations
+    return w.function("implicit", f"{vector} %phase, {vector} %step, ptr noalias %memory, ptr noalias %shared")
 
 
 REFILL = """define internal i1 @refill(ptr %memory, ptr %queue, i64 %lanes, ptr %loaded, ptr %stored) noinline {{
@@ -153,15 +134,7 @@ load:
   store double %given, ptr %out
   %s_next = add i64 %s, 1
   %rest = icmp slt i64 %s_next, {n_loaded}
-  br i1 %rest, label %load, label %zero
-zero:
-  %z = phi i64 [ {n_loaded}, %load ], [ %z_next, %zero ]
-  %zero_row = mul i64 %z, {width}
-  %zero_at = getelementptr double, ptr %column, i64 %zero_row
-  store double 0.0, ptr %zero_at
-  %z_next = add i64 %z, 1
-  %zeros = icmp slt i64 %z_next, {n_zero}
-  br i1 %zeros, label %zero, label %begin
+  br i1 %rest, label %load, label %begin
 begin:
   %number = sitofp i64 %new to double
   store double %number, ptr %place_at
@@ -183,24 +156,13 @@ return:
 """This function stores lanes that have left and loads lanes of the queue. Its result is true if any lane is left."""
 
 
-def _refill(rows: Layout, width: int) -> tuple[str, set[str]]:
-    return REFILL.format(
-        width=width,
-        mark=rows["mark"][0] * width,
-        lane=rows["lane"][0] * width,
-        n_stored=rows.end("mark"),
-        n_loaded=rows.end("fixed"),
-        n_zero=rows.end("first_step"),
-    ), set()
-
-
 def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str, set[str]]:
     """Steps of a vector of lanes, one after the other, with their control."""
     w = Code(width)
     n, moving, stages, span = field.dimension, field.moving, len(tableau.phase), field.span
-    one, zero = number(1.0), number(0.0)
-    row = {name: rows[name][0] for name in rows.rows if len(rows[name]) > 0}
-    at_stage = lambda i: row["rate"] + i * span
+    one, zero, marked = number(1.0), number(0.0), lambda code: number(code + 1.0)
+    row = {name: rows[name][0] for name in rows if rows[name]}
+    at_stage, total_rows = lambda i: row["rate"] + i * span, rows["made"].stop
     vector = w.type("double", True)
 
     def since_zero(phase: Value) -> Value:
@@ -217,8 +179,8 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
         at = w.at(place).text, w.at(out).text
         w.line(f"call void @rates({w.typed(phase)}, ptr {at[0]}, ptr %memory, ptr %shared, ptr {at[1]})")
 
-    w.line(f"%memory = alloca {vector}, i64 {rows.total}, align {max(64, width * 8)}")
-    size = rows.total * width * 8
+    w.line(f"%memory = alloca {vector}, i64 {total_rows}, align {max(64, width * 8)}")
+    size = total_rows * width * 8
     w.line(f"call void @llvm.memset.p0.i64(ptr align 8 %memory, i8 0, i64 {size}, i1 false)")
     w.declarations.add("declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)")
     for k, name in enumerate(("tolerance", "largest", "smallest", "most")):
@@ -272,7 +234,7 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     fine = w.compare("le", error, one)
     moves = w.both(fine, runs)
     bits, last = w.log2(error), w.get(row["error"])
-    proposed = next_step(w, tableau.order, Tried(step, limited, ends, halves, fine, bits, last), largest)
+    proposed = next_step(w, tableau.order, step, limited, w.simple("or", ends, halves), fine, bits, last, largest)
     w.put(row["step"], w.select(runs, proposed, h))
     w.put(row["error"], w.select(moves, w.larger(bits, number(-16.0)), last))
     over = w.both(moves, ends)
@@ -289,18 +251,18 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     (size,) = w.over(moving, [zero], accept)
     if field.excursion is not None:
         new = w.all(range(row["stage"], row["stage"] + n))
-        watched, w.block = w.program(field.excursion, arguments(field.excursion, [zero, *new]), w.block)
+        watched = w.program(field.excursion, arguments(field.excursion, [zero, *new]))
     else:
         watched = [w.get(at_stage(stages - 1) + moving + k) for k in range(field.watched)]
     for k, x in enumerate(map(w.widened, watched)):
         peak = w.get(row["peak"] + k)
         w.put(row["peak"] + k, w.select(w.both(moves, w.compare("gt", x, peak)), x, peak))
-    mark = w.select(w.both(moves, w.compare("gt", w.widened(watched[0]), number(2.0))), number(OUTSIDE), mark)
+    mark = w.select(w.both(moves, w.compare("gt", w.widened(watched[0]), number(2.0))), marked(OUTSIDE), mark)
     refused = w.both(runs, w.negated(fine), w.compare("lt", proposed, smallest))
     finite = w.compare("lt", size, number(np.inf))
-    mark = w.select(refused, w.select(finite, number(STUCK), number(NOT_FINITE)), mark)
+    mark = w.select(refused, w.select(finite, marked(STUCK), marked(NOT_FINITE)), mark)
     mark = w.select(
-        w.both(runs, w.compare("gt", taken, w.mul(most, w.add(w.get(row["revolution"]), one)))), number(TOO_MANY), mark
+        w.both(runs, w.compare("gt", taken, w.mul(most, w.add(w.get(row["revolution"]), one)))), marked(TOO_MANY), mark
     )
     w.put(row["mark"], mark)
     w.line(f"br i1 {w.any(over).text}, label %over, label %check")
@@ -336,7 +298,7 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
 
         w.over(moving, (), renew)
     finished = w.both(over, w.compare("ge", revolution, total), w.compare("eq", mark, zero))
-    w.put(row["mark"], w.select(finished, number(FINISHED), mark))
+    w.put(row["mark"], w.select(finished, marked(FINISHED), mark))
     w.line("br label %check")
 
     w.line("check:")

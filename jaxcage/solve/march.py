@@ -23,7 +23,7 @@ from jax.core import Tracer
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Int
 
-from .ir import UnknownOperation, Value, Writer, number, say_once
+from .ir import Code, UnknownOperation, Value, number, say_once
 from .program import CONTROL_FLOW, Numbers, Sizes, Step, program_of
 from .xla_call import UnknownInterface, handler_ir, registered
 
@@ -212,20 +212,15 @@ def _plain(step: Step, count: Any, moved: Numbers, watched: Numbers, fixed: Numb
 
 
 def _inside_jax(count: Array, *numbers: Array, how: How) -> list[Array]:
-    """The march where there is no machine code."""
+    """The march where there is no machine code; numbers that all lanes share are scalars."""
 
     def lane(*numbers: Array) -> list[Array]:
         out = _plain(how.step, count, *how.sizes.split(numbers))
         return [*out[0], *out[1]]
 
-    return _in_lanes(lane, numbers)
-
-
-def _in_lanes(f: Callable[..., Sequence[Array]], numbers: Sequence[Array]) -> list[Array]:
-    """f of the numbers of each lane; those that all lanes share are scalars."""
     for _ in range(max(len(x.shape) for x in numbers)):
-        f = jax.vmap(f, in_axes=tuple(0 if x.shape else None for x in numbers))
-    return list(f(*numbers))
+        lane = jax.vmap(lane, in_axes=tuple(0 if x.shape else None for x in numbers))
+    return lane(*numbers)
 
 
 def _on_cpu(count: Array, *numbers: Array, how: How) -> list[Array]:
@@ -269,7 +264,7 @@ def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: 
     are `read`, each with its place behind those and whether lanes have one each. There are `width`
     lanes at least: the last vector of them overlaps the one before it.
     """
-    w = Writer(width)
+    w = Code(width)
     pointer = lambda base, k: w.let(
         f"load ptr, ptr {w.let(f'getelementptr ptr, ptr {base}, i64 {k}', 'ptr', False).text}", "ptr", False
     )
@@ -301,9 +296,9 @@ def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: 
     state = [Value(f"%s{k}", "double", True) for k in range(moving)]
     step_number = w.convert("sitofp", Value("%i", "i64", False), "double")
     fixed = [shared.get(k, own.get(k, number(0.0))) for k in range(len(program.jaxpr.invars) - 1 - moving)]
-    results, latch = w.program(program, [step_number, *state, *fixed], "step")
-    results = [w.widened(x) for x in results]
-    body = w.taken()
+    w.block = "step"
+    results = [w.widened(x) for x in w.program(program, [step_number, *state, *fixed])]
+    body, latch = w.taken(), w.block
     phis = "\n".join(
         f"  {s.text} = phi {vector} [ {b.text}, %vector ], [ {r.text}, %{latch} ]"
         for s, b, r in zip(state, begun, results, strict=True)
@@ -342,11 +337,6 @@ march_p = jex.core.Primitive("march")
 march_p.multiple_results = True
 
 
-@functools.lru_cache(maxsize=256)
-def _alone(how: How) -> Callable[..., Any]:
-    return jax.jit(functools.partial(march_p.bind, how=how))
-
-
 def _abstract(count: Any, *numbers: Any, how: How) -> list[Any]:
     del count
     like = max(numbers, key=lambda x: len(x.shape))
@@ -372,14 +362,9 @@ def _batch(args: Sequence[Any], dims: Sequence[Any], *, how: How) -> Any:
 
 
 def _lanes(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How) -> Any:
-    """All numbers that are mapped, moved or in lanes already as lanes of one shape, the new axis first."""
+    """The march of lanes of one shape, the new axis first; numbers that all lanes share stay scalars."""
     count, *numbers = args
-    return march_p.bind(count, *_spread(numbers, mapped[1:], size), how=how)
-
-
-def _spread(numbers: Sequence[Any], mapped: Sequence[bool], size: int) -> list[Any]:
-    """Numbers as lanes of one shape, the new axis first; those that all lanes share stay scalars."""
-    shape = max((x.shape[m:] for x, m in zip(numbers, mapped, strict=True)), key=len)
+    shape = max((x.shape[m:] for x, m in zip(numbers, mapped[1:], strict=True)), key=len)
 
     def spread(x: Any, m: bool) -> Any:
         if not m and not x.shape:
@@ -387,7 +372,7 @@ def _spread(numbers: Sequence[Any], mapped: Sequence[bool], size: int) -> list[A
         x = x if m else x[None]
         return jnp.broadcast_to(x.reshape(x.shape + (1,) * (1 + len(shape) - x.ndim)), (size, *shape))
 
-    return [spread(x, m) for x, m in zip(numbers, mapped, strict=True)]
+    return march_p.bind(count, *map(spread, numbers, mapped[1:]), how=how)
 
 
 def _directions(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How) -> Any:
@@ -432,7 +417,7 @@ def _jvp(primals: Sequence[Any], tangents: Sequence[Any], *, how: How) -> Any:
     return [*values, *seen], [*slopes, *none]
 
 
-march_p.def_impl(lambda *args, how: _alone(how)(*args))
+march_p.def_impl(jax.jit(march_p.bind, static_argnames="how"))
 march_p.def_abstract_eval(_abstract)
 batching.primitive_batchers[march_p] = _batch
 ad.primitive_jvps[march_p] = _jvp

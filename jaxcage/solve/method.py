@@ -2,7 +2,6 @@
 
 import abc
 import math
-from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import diffrax as dfx
@@ -12,22 +11,17 @@ import jax.numpy as jnp
 from jaxtyping import Array, Int
 
 from .._errors import ArgumentError
-from .._pytrees import Scalar, State
-from ..models import (
-    ESCAPE,
-    ScaledField,
-    divide,
-    multiply,
-)
-from .kernel import REVOLUTION, Pieces, can_be_kernel, steps_through
+from .._pytrees import Scalar, State, split
+from ..models import ESCAPE, ScaledField, divide, multiply
+from .kernel import REVOLUTION, Parts, Pieces, Tangents, can_be_kernel, steps_through
 from .layout import PAIRS
 from .march import with_tangents
-from .outcomes import RESULTS, outcome_code
+from .outcomes import FINISHED, NOT_FINITE, OTHER, OUTCOMES, OUTSIDE, TOO_MANY
 from .solvers import ClassicalRK4, Rodas4
 
 
-FIRST_STEPS = 64
-"""The first of adaptive steps is a revolution over so many."""
+FIRST_STEPS, MOST_STEPS = 64, 100_000
+"""The first of adaptive steps is a revolution over so many; and the most of them."""
 SHARPER = 1e-2
 """Tolerance of the run that measures errors, as a fraction of the tolerance."""
 DEFAULT_TOLERANCE = 1e-6
@@ -41,35 +35,14 @@ FINER = 16.0
 
 
 class Stretch(NamedTuple):
-    """A part of a revolution: where it ended, how far out it went on the way, and how it went."""
+    """A lane after a part of a revolution; or many, their axis last."""
 
     y: State
-    peak: Scalar
-    result: RESULTS
-
-
-Tangents = tuple[State, ...]
-
-
-class Moved(NamedTuple):
-    """A lane after a revolution; or many, their axis last."""
-
-    y: State
-    tangents: Tangents
     peak: Scalar
     """Largest excursion on the way."""
     outcome: Int[Array, "*lanes"]
-
-
-def moved_by(advance: Callable[[Any], Stretch], start: Any, tangents: Sequence[Any]) -> Moved:
-    """One lane moved by `advance` from its start, the tangent vectors there by the derivative of that."""
-
-    def move(start: Any) -> tuple[State, tuple[Any, ...]]:
-        stretch = advance(start)
-        return stretch.y, (jnp.asarray(stretch.peak, dtype=float), outcome_code(stretch.result))
-
-    y, after, (peak, code) = with_tangents(move, start, tangents)
-    return Moved(y, after, peak, code)
+    """Place in `OUTCOMES`."""
+    tangents: tuple[State, ...]
 
 
 def _evaluate(tau: Any, y: Any, field: Any) -> State:
@@ -100,22 +73,17 @@ class AbstractMethod(eqx.Module):
 
     @abc.abstractmethod
     def finer(self, times: int = 1) -> "AbstractMethod":
-        """The same with steps at most half as long, `times` over, for what it is to be confirmed by."""
+        """The same with steps half as long, or tolerances `FINER` times smaller, `times` over, to confirm it by."""
 
     @abc.abstractmethod
-    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
-        """Go one `parts`-th of a revolution from state `y` at `phase`."""
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Parts, tangents: Tangents = ()) -> Stretch:
+        """Go one `parts`-th of a revolution from state `y` at `phase`, with tangent vectors."""
 
 
-def result_at(result: Any, y: State, excursion: Scalar) -> RESULTS:
-    """The result of a state that a solver returned with one of diffrax's results."""
+def _outcome_at(y: State, excursion: Scalar) -> Int[Array, ""]:
+    """The outcome of an integration that came to a state."""
     finite = jnp.isfinite(sum(jnp.sum(jnp.abs(c)) for c in y))
-    state = RESULTS.where(excursion <= ESCAPE, RESULTS.successful, RESULTS.outside)  # pyright: ignore
-    state = RESULTS.where(finite, state, RESULTS.not_finite)  # pyright: ignore
-    if result is dfx.RESULTS.successful:  # what is known to be well is not promoted: that takes ten small programs
-        return state  # pyright: ignore
-    before = RESULTS.promote(result)
-    return RESULTS.where(before == RESULTS.successful, state, before)  # pyright: ignore
+    return jnp.where(finite, jnp.where(excursion <= ESCAPE, FINISHED, OUTSIDE), NOT_FINITE)
 
 
 class FixedSteps(AbstractMethod):
@@ -137,14 +105,13 @@ class FixedSteps(AbstractMethod):
         return self.finer()
 
     def finer(self, times: int = 1) -> "FixedSteps":
-        """With twice the steps, `times` over."""
         return FixedSteps(self.solver, self.steps << times)
 
-    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Parts, tangents: Tangents = ()) -> Stretch:
         if isinstance(self.steps, int) and isinstance(parts, int) and self.steps % parts:
             raise ArgumentError("parts", said=f"must divide the {self.steps} steps per revolution, but it is {parts}.")
-        y, peak, _ = steps_through(self.solver, self.steps, pieces, y, phase=phase, parts=parts)
-        return Stretch(y, peak, result_at(dfx.RESULTS.successful, y, peak))
+        y, peak, after = steps_through(self.solver, self.steps, pieces, y, phase, parts, tangents)
+        return Stretch(y, peak, _outcome_at(y, peak), after)
 
 
 class AdaptiveSteps(AbstractMethod):
@@ -153,47 +120,51 @@ class AdaptiveSteps(AbstractMethod):
     The largest excursion is that of the ends of revolutions, or of their parts."""
 
     solver: dfx.AbstractAdaptiveSolver
-    rtol: float = eqx.field(static=True, default=1e-6)
-    atol: float = eqx.field(static=True, default=1e-6)
-    max_steps: int = eqx.field(static=True, default=100_000)
-
-    @property
-    def tolerance(self) -> float:
-        """Lower bound of a measured error."""
-        return self.atol
+    tolerance: float = eqx.field(static=True)
+    """Of the error estimate, relative to the state and to the system's scale; and a lower bound of a measured error."""
 
     @property
     def reference(self) -> "AdaptiveSteps":
-        return self._with(SHARPER)
+        return AdaptiveSteps(self.solver, SHARPER * self.tolerance)
 
     def finer(self, times: int = 1) -> "AdaptiveSteps":
-        """With tolerances 16 times smaller, `times` over."""
-        return self._with(16.0**-times)
+        return AdaptiveSteps(self.solver, FINER**-times * self.tolerance)
 
-    def _with(self, factor: float) -> "AdaptiveSteps":
-        return AdaptiveSteps(self.solver, factor * self.rtol, factor * self.atol, self.max_steps)
-
-    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Parts, tangents: Tangents = ()) -> Stretch:
         field, system, scale = pieces
+        moving = any(drift is not None for _, drift in tangents)
+        form, row = split(field, lambda leaf: moving and eqx.is_inexact_array(leaf))
         length = REVOLUTION / jnp.asarray(parts, dtype=float)
-        solution = dfx.diffeqsolve(
-            TERM,
-            self.solver,
-            t0=phase,
-            t1=phase + length,
-            dt0=jnp.minimum(REVOLUTION / FIRST_STEPS, length),
-            y0=divide(y, scale),
-            args=ScaledField(field, scale),
-            stepsize_controller=dfx.PIDController(self.rtol, self.atol, pcoeff=0.3, icoeff=0.4),
-            saveat=dfx.SaveAt(t1=True),
-            adjoint=dfx.ForwardMode(),
-            max_steps=self.max_steps,
-            throw=False,
-        )
-        assert solution.ys is not None
-        y = multiply(tuple(c[-1] for c in solution.ys), scale)
-        excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y), dtype=float))
-        return Stretch(y, excursion, result_at(solution.result, y, excursion))
+
+        def move(start: tuple[State, list[Array]]) -> tuple[State, tuple[Array, Array]]:
+            y, row = start
+            solution = dfx.diffeqsolve(
+                TERM,
+                self.solver,
+                t0=phase,
+                t1=phase + length,
+                dt0=jnp.minimum(REVOLUTION / FIRST_STEPS, length),
+                y0=divide(y, scale),
+                args=ScaledField(form.filled(row), scale),
+                stepsize_controller=dfx.PIDController(self.tolerance, self.tolerance, pcoeff=0.3, icoeff=0.4),
+                saveat=dfx.SaveAt(t1=True),
+                adjoint=dfx.ForwardMode(),
+                max_steps=MOST_STEPS,
+                throw=False,
+            )
+            assert solution.ys is not None
+            y = multiply(tuple(c[-1] for c in solution.ys), scale)
+            excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y), dtype=float))
+            failed = jnp.full((), OTHER)
+            for name in OUTCOMES[TOO_MANY:OTHER]:
+                failed = jnp.where(solution.result == getattr(dfx.RESULTS, name), OUTCOMES.index(name), failed)
+            well = solution.result == dfx.RESULTS.successful
+            return y, (excursion, jnp.where(well, _outcome_at(y, excursion), failed))
+
+        zero = list(map(jnp.zeros_like, row))
+        filled = lambda drift: [z if d is None else d for z, d in zip(zero, drift or zero, strict=True)]
+        end, after, (peak, outcome) = with_tangents(move, (y, row), [(t, filled(drift)) for t, drift in tangents])
+        return Stretch(end, peak, outcome, after)
 
 
 class NativeSteps(AbstractMethod):
@@ -214,8 +185,7 @@ class NativeSteps(AbstractMethod):
 
     @property
     def in_jax(self) -> AdaptiveSteps:
-        solver = Rodas4() if self.pair == IMPLICIT else dfx.Tsit5()
-        return AdaptiveSteps(solver, self.tolerance, self.tolerance)
+        return AdaptiveSteps(Rodas4() if self.pair == IMPLICIT else dfx.Tsit5(), self.tolerance)
 
     @property
     def reference(self) -> "NativeSteps":
@@ -226,11 +196,10 @@ class NativeSteps(AbstractMethod):
         """The same by the implicit method, for stiff laws."""
         return NativeSteps(self.tolerance, self.error, IMPLICIT)
 
-    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
-        return self.in_jax.advance(pieces, y, phase, parts)
+    def advance(self, *args: Any, **kwargs: Any) -> Stretch:
+        return self.in_jax.advance(*args, **kwargs)
 
     def finer(self, times: int = 1) -> "NativeSteps":
-        """The same with tolerances 16 times smaller, `times` over."""
         factor = FINER**-times
         return NativeSteps(factor * self.tolerance, factor * self.error, self.pair)
 
@@ -276,9 +245,13 @@ def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: fl
         return FixedSteps(_SOLVERS[solver], DEFAULT_STEPS if steps is None else steps)
     if steps is not None:
         raise ArgumentError("steps", "tolerance", said="must not both be given: steps are fixed or adaptive.")
+    _require_tolerance(tolerance)
+    return AdaptiveSteps(_SOLVERS[solver], tolerance)
+
+
+def _require_tolerance(tolerance: float) -> None:
     if not 0 < tolerance < 1:
         raise ArgumentError("tolerance", said=f"must lie between 0 and 1, but {tolerance} was given.")
-    return AdaptiveSteps(_SOLVERS[solver], tolerance, tolerance)
 
 
 def native(
@@ -293,8 +266,7 @@ def native(
 
     **Raises:** `ValueError` for numbers that are not positive, and an unknown pair.
     """
-    if not 0 < tolerance < 1:
-        raise ArgumentError("tolerance", said=f"must lie between 0 and 1, but {tolerance} was given.")
+    _require_tolerance(tolerance)
     if not error > 0:
         raise ArgumentError("error", said=f"must be positive, but {error} was given.")
     if pair not in PAIRS:

@@ -86,7 +86,9 @@ _libraries: dict[tuple[str, str], Any] = {}
 _linking = threading.Lock()
 
 
-def _loaded(ir: str, name: str) -> Any:
+def function(ir: str, name: str) -> int:
+    """Address of a function of a module. Code is never freed: a program whose code is freed while it runs ends the
+    process."""
     if (ir, name) not in _libraries:
         code = object_code(ir)
         with _linking:  # threads may ask for the same module, and the linker takes each name once
@@ -94,10 +96,4 @@ def _loaded(ir: str, name: str) -> Any:
                 builder = orcjit.JITLibraryBuilder().add_object_img(code).add_current_process()
                 named = name + hashlib.sha256(ir.encode()).hexdigest()[:24]
                 _libraries[ir, name] = builder.export_symbol(name).link(_linker(), named)
-    return _libraries[ir, name]
-
-
-def function(ir: str, name: str) -> int:
-    """Address of a function of a module. Code is never freed: a program whose code is freed while it runs ends the
-    process."""
-    return _loaded(ir, name)[name]
+    return _libraries[ir, name][name]

@@ -1,28 +1,9 @@
-"""Results of an integration, and how it ended: diffrax's outcomes and our own, each a sentence with the cure."""
+"""Results of an integration, and how it ended."""
 
 from typing import NamedTuple
 
-import diffrax as dfx
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
-
-from .loop import DIVERGED, FINISHED, NOT_FINITE, OUTSIDE, STUCK, TOO_MANY
-
-
-class RESULTS(dfx.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
-    """Outcome of an integration; `successful` and the rest of diffrax's outcomes are inherited."""
-
-    not_finite = "The state became infinite or undefined: use more steps per revolution, or a smaller tolerance."
-    outside = (
-        "The state started outside, or went far outside, what the model holds for (a cage: eps > 1 at the start, "
-        "eps > 2 later): start inside the clearance, or use a stiffer contact or more steps per revolution."
-    )
-    inaccurate = (
-        "A revolution still moves by more than the tolerance when its steps are halved, on the finest steps allowed: "
-        "allow a larger error or finer steps, or look for a contact or spring that is stiffer than meant, or for a "
-        "motion that grows without bound."
-    )
+from jaxtyping import Float, Int
 
 
 OUTCOMES = (
@@ -35,37 +16,11 @@ OUTCOMES = (
     "other",
     "inaccurate",
 )
-"""Names of outcomes in the order of the integer codes that sweeps store."""
-
-
-MARKS = {
-    "successful": FINISHED,
-    "outside": OUTSIDE,
-    "not_finite": NOT_FINITE,
-    "dt_min_reached": STUCK,
-    "max_steps_reached": TOO_MANY,
-    "nonlinear_divergence": DIVERGED,
-    "other": DIVERGED,
-}
-"""The mark with which the integration loop says so."""
-_OUTCOME = {mark: OUTCOMES.index(name) for name, mark in list(MARKS.items())[:6]}
-
-
-def codes_of(marks: Float[np.ndarray, " lanes"]) -> Int[np.ndarray, " lanes"]:
-    """Places in `OUTCOMES` of what the integration loop marked lanes with."""
-    return np.array([_OUTCOME[mark] for mark in marks], dtype=np.int32)
-
-
-INACCURATE = OUTCOMES.index("inaccurate")
-_KNOWN = {name: i for i, name in enumerate(OUTCOMES) if name != "other"}
-
-
-def outcome_code(result: RESULTS) -> Int[Array, ""]:
-    """The place of `result` in `OUTCOMES`."""
-    code = jnp.full((), OUTCOMES.index("other"), dtype=jnp.int32)
-    for name, i in _KNOWN.items():
-        code = jnp.where(result == getattr(RESULTS, name), jnp.int32(i), code)
-    return code
+"""Names of outcomes in the order of the integer codes that sweeps store: all revolutions done; the state became
+infinite or undefined; the state started outside, or went far outside, what the model holds for; too many steps in a
+revolution; an iteration that did not converge; the error cannot be met by the smallest step; another failure of
+diffrax; a revolution whose measured error is larger than allowed, on the finest steps."""
+FINISHED, NOT_FINITE, OUTSIDE, TOO_MANY, DIVERGED, STUCK, OTHER, INACCURATE = range(len(OUTCOMES))
 
 
 class March(NamedTuple):
@@ -81,8 +36,8 @@ class March(NamedTuple):
     the whole run (parts = 1)."""
     steps: Float[np.ndarray, " lanes"]
     """Number of steps tried."""
-    mark: Float[np.ndarray, " lanes"]
-    """How each lane ended, as in `loop`; 0 if it was not run."""
+    outcome: Int[np.ndarray, " lanes"]
+    """Code of how each lane ended, its place in `OUTCOMES`; -1 if it was not run."""
     strobe: Float[np.ndarray, "lanes keep numbers"]
     """The last strobe states, the latest last, as `state` is."""
     growth: Float[np.ndarray, "lanes revolutions tangents"]

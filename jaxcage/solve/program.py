@@ -1,6 +1,5 @@
 """Scalar functions traced once: what a step computes, written out as elementary operations."""
 
-import dataclasses
 import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -16,8 +15,8 @@ Numbers = tuple[Any, ...]
 Step = Callable[[Any, Numbers, Numbers, Numbers], tuple[Sequence[Any], Sequence[Any]]]
 """(number of the step, what it moves, what it watches, what is fixed) -> (moved, watched), all scalars.
 
-What is watched (a maximum, an error estimate) has no derivative. A dataclass is known by its fields, which are no
-arrays: one that equals an earlier one is not traced again."""
+What is watched (a maximum, an error estimate) has no derivative. A step that equals an earlier one, as a dataclass of
+the same fields does, is not traced again."""
 
 CONTROL_FLOW = {"while", "scan", "cond"}
 STAYS_CALL = "evaluated_often"
@@ -47,26 +46,23 @@ class Program(NamedTuple):
 
     jaxpr: Any
     consts: Any
-    needed: list[int]
-    """Which of its arguments it uses."""
+
+    @property
+    def needed(self) -> list[int]:
+        """Which of its arguments it uses."""
+        read = _variables(self.jaxpr.outvars).union(*map(_read, self.jaxpr.eqns))
+        return [i for i, v in enumerate(self.jaxpr.invars) if v in read]
 
     def __call__(self, *x: Any) -> list[Any]:
         return eval_jaxpr(self.jaxpr, self.consts, *x)
-
-
-def program_of(step: Any, sizes: Sizes, rules: bool = False) -> Program:
-    """The program of a step; with `rules`, functions that have a derivative of their own, and those that are evaluated
-    often, stay calls: to be differentiated, for which a program is traced much faster than the code that it came from.
-    """
-    write_out: Callable[..., Program] = _kept if dataclasses.is_dataclass(step) else _written_out
-    return write_out(step, sizes, rules)
 
 
 def _arguments(sizes: Sizes) -> list[Any]:
     return [jax.ShapeDtypeStruct((), float)] * (1 + sum(sizes))
 
 
-def _trace(step: Step, sizes: Sizes) -> Any:
+@functools.lru_cache(maxsize=128)
+def _traced(step: Step, sizes: Sizes) -> Any:
     """The step as a function (number, moved, watched, fixed) -> (moved, watched) of scalars in a row."""
 
     def flat(i: Any, *x: Any) -> tuple[Any, ...]:
@@ -76,19 +72,16 @@ def _trace(step: Step, sizes: Sizes) -> Any:
     return jax.make_jaxpr(flat)(*_arguments(sizes))
 
 
-def _written_out(step: Step, sizes: Sizes, rules: bool) -> Program:
-    traced = _traced(step, sizes) if dataclasses.is_dataclass(step) else _trace(step, sizes)
+@functools.lru_cache(maxsize=128)
+def program_of(step: Step, sizes: Sizes, rules: bool = False) -> Program:
+    """The program of a step; with `rules`, functions that have a derivative of their own, and those that are evaluated
+    often, stay calls: to be differentiated, for which a program is traced much faster than the code that it came from.
+    """
+    traced = _traced(step, sizes)
     once = functools.partial(_inlined, traced.jaxpr, traced.consts, seen={}, rules=rules)
     traced = jax.make_jaxpr(once)(*_arguments(sizes))
     jaxpr = traced.jaxpr
-    equations = _needed(jaxpr.eqns, jaxpr.outvars)
-    jaxpr = jaxpr.replace(eqns=equations)
-    read = _variables(jaxpr.outvars).union(*map(_read, equations))
-    return Program(jaxpr, traced.consts, [i for i, v in enumerate(jaxpr.invars) if v in read])
-
-
-_traced = functools.lru_cache(maxsize=128)(_trace)
-_kept = functools.lru_cache(maxsize=128)(_written_out)
+    return Program(jaxpr.replace(eqns=needed(jaxpr.eqns, jaxpr.outvars)), traced.consts)
 
 
 def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any], rules: bool) -> list[Any]:
@@ -113,7 +106,16 @@ def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any]
     return [read(v) for v in jaxpr.outvars]
 
 
-def _needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
+def following(equations: Sequence[Any], given: Sequence[Any]) -> set[Any]:
+    """The variables given, and those that follow from any of them."""
+    found = set(given)
+    for e in equations:
+        if found & _variables(e.invars):
+            found.update(e.outvars)
+    return found
+
+
+def needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
     """Those of the equations that what is wanted follows from, in their order."""
     reached = _variables(wanted)
     kept = []

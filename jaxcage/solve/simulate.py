@@ -1,7 +1,6 @@
 """Time histories at constant speed and through a speed ramp."""
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -26,7 +25,7 @@ from ..quantities import notebook_html
 from .engine import CHUNK, RETRIES, Lanes, errors_of_parts, errors_of_stretches, has_implicit
 from .kernel import REVOLUTION
 from .method import IMPLICIT, AbstractMethod, FixedSteps, NativeSteps, native
-from .outcomes import INACCURATE, OUTCOMES, codes_of
+from .outcomes import INACCURATE, OUTCOMES, OUTSIDE, STUCK, TOO_MANY
 
 
 TOLERANCE = 1e-8
@@ -37,7 +36,6 @@ MOST_PARTS = 1000
 """Most parts from sample to sample in which errors are measured."""
 Start = State | BearingState | Float[Array, " dim"] | Float[np.ndarray, " dim"]
 """An initial state [SI]: a tuple of numbers; of a whole bearing a row of them, or by name."""
-SERVED_BADLY = [OUTCOMES.index(name) for name in ("dt_min_reached", "max_steps_reached")]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,14 +129,6 @@ def _start(system: AbstractForcedSystem, speed: float, start: Start | None) -> n
     return np.concatenate([y0, beside])
 
 
-def _require_fits(method: AbstractMethod, samples: int) -> None:
-    """**Raises:** `ValueError` for a method that does not go with the samples."""
-    if isinstance(method, FixedSteps) and method.steps % samples:
-        raise ArgumentError(
-            "samples", said=f"must divide the {method.steps} steps per revolution of the method, but is {samples}."
-        )
-
-
 class _Ran(NamedTuple):
     """Strobe states by one method."""
 
@@ -163,13 +153,13 @@ def _run(lanes: Lanes, samples: int, stretch: int, start: np.ndarray, method: Ab
     numbers = lanes.numbers(engine, every)
     scale, (excursion, *_) = lanes.begin(every, np.broadcast_to(start, (n, start.size)))
     y, peaks = np.full((n + 1, start.size), np.nan), np.full((n, len(lanes.system.watched)), np.nan)
-    y[0], code = start, 0 if excursion <= 1 or lanes.system.beside else OUTCOMES.index("outside")
+    y[0], code = start, 0 if excursion <= 1 or lanes.system.beside else OUTSIDE
     step, done, steps = None, 0, 0.0
     while done < n and code == 0:  # a revolution at a time if its speed does not change
         some = samples if done + samples <= n and speed[done + samples - 1] == speed[done] else 1
         at, first = engine.picked(numbers, every[done : done + 1]), y[done : done + 1] / scale[done]
         ran = engine(at, first, some, some, method, step=step, begin=begin[done : done + 1])
-        y[done + 1 : done + 1 + some], code = ran.strobe[0] * scale[done], int(codes_of(ran.mark)[0])
+        y[done + 1 : done + 1 + some], code = ran.strobe[0] * scale[done], int(ran.outcome[0])
         step, steps = ran.step if ran.step[0] else step, steps + float(ran.steps[0])
         peaks[done : done + ran.peaks.shape[1]], done = ran.peaks[0], done + some
     if done == 0:
@@ -177,19 +167,19 @@ def _run(lanes: Lanes, samples: int, stretch: int, start: np.ndarray, method: Ab
     ends = np.flatnonzero(np.all(np.isfinite(y[1:]), axis=1))
     apart = np.zeros(n)
     for some in np.split(ends, range(CHUNK, ends.size, CHUNK)) if ends.size else ():
-        given = engine.picked(numbers, some), y[some] / scale[some], y[some + 1] / scale[some]
-        apart[some] = errors_of_parts(engine, *given, dim, method, begin=begin[some])
+        states = np.stack([y[some], y[some + 1]], axis=1) / scale[some, None]
+        own = engine.picked(numbers, some)
+        apart[some] = errors_of_parts(engine, own, states, dim, method, begin=begin[some])[:, 0]
     return _Ran(y, peaks, errors_of_stretches(apart, stretch, method), code, steps)
 
 
 def _methods(method: AbstractMethod, system: AbstractForcedSystem) -> Iterator[AbstractMethod]:
     """The method, finer ones for a run whose error is too large, and implicit ones."""
-    yield method
-    finer = range(1, RETRIES + 1) if math.isfinite(method.allowed) else ()
-    yield from map(method.finer, finer)
+    every = [method]
     if isinstance(method, NativeSteps) and has_implicit(system) and method.pair != IMPLICIT:
-        yield method.implicit
-        yield from map(method.implicit.finer, finer)
+        every.append(method.implicit)
+    times = range(1 + RETRIES) if math.isfinite(method.allowed) else range(1)
+    return (each.finer(k) for each in every for k in times)
 
 
 def simulate(
@@ -249,7 +239,9 @@ def ramp(
     require_at_least(0, discard=discard)
     default = native(BEARING_TOLERANCE, BEARING_ERROR) if system.beside else native(TOLERANCE)
     chosen = default if method is None else method
-    _require_fits(chosen, samples)
+    if isinstance(chosen, FixedSteps) and chosen.steps % samples:
+        said = f"must divide the {chosen.steps} steps per revolution of the method, but is {samples}."
+        raise ArgumentError("samples", said=said)
     rise = (high - low) / revolutions
     numbers = np.arange(-discard, revolutions)
     rises = np.where(numbers < 0, 0.0, rise)
@@ -261,9 +253,9 @@ def ramp(
     stretch = max(1, round(comparable * places / REVOLUTION))
     lanes, y0 = Lanes.of([system], speeds), _start(system, low, start)
     runs = (_run(lanes, places, stretch, y0, each) for each in _methods(chosen, system))
-    served = lambda ran: ran.code not in SERVED_BADLY and not np.any(ran.errors > chosen.allowed)
+    served = lambda ran: ran.code not in (STUCK, TOO_MANY) and not np.any(ran.errors > chosen.allowed)
     first_run = next(runs)
-    ran = next(filter(served, itertools.chain([first_run], runs)), first_run)
+    ran = first_run if served(first_run) else next(filter(served, runs), first_run)
     states, code = ran.states.copy(), ran.code
     if np.any(bad := ran.errors > chosen.allowed):  # behind a stretch whose error is too large nothing is known
         states[int(np.argmax(bad)) * stretch + 1 :] = np.nan
@@ -281,15 +273,9 @@ def ramp(
         states = states[:-1]
     excursion = lanes.begin(np.arange(speeds.size), ran.states[:-1])[1][::places]
     peak = float(np.fmax.reduce([*ran.peaks[discard * places :, -1], *excursion[discard:]]))
+    known = time, tau, states[:, :dim], speed, samples, peak, OUTCOMES[code], float(ran.errors.max())
     return Trajectory(
-        time,
-        tau,
-        states[:, :dim],
-        speed,
-        samples,
-        peak,
-        OUTCOMES[code],
-        float(ran.errors.max()),
+        *known,
         beside=system.beside,
         integrals=states[:, dim:],
         watched=system.watched,

@@ -154,7 +154,7 @@ class ClassicalRK4(dfx.AbstractERK):
 
 
 def explicit_step(
-    tableau: dfx.ButcherTableau, field: AbstractField, t0: Scalar, size: Callable[[State], Scalar], y0: State
+    tableau: Any, field: AbstractField, t0: Scalar, size: Callable[[State], Scalar], y0: State
 ) -> tuple[State, Scalar]:
     """One step from y0 at phase t0, for a method whose last stage is the first of the next step.
 

@@ -6,7 +6,7 @@ abruptly; a PI controller chooses the next one from the errors of this step and 
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from .ir import Code, Value, number
 from .layout import Field, Layout, Tableau, fixed_numbers
@@ -20,31 +20,13 @@ NEAREST = 1e-4
 """Time to an abrupt change of the law [rad] below which steps are not shortened any further."""
 
 
-class Tried(NamedTuple):
-    """A step that was tried."""
-
-    step: Value
-    limited: Value
-    """Size of the step before it was shortened."""
-    ends: Value
-    """Mask: it was shortened to end at the strobe state."""
-    halves: Value
-    """Mask: it was shortened to half of what was left."""
-    fine: Value
-    """Mask: its error is allowed."""
-    bits: Value
-    """Binary logarithm of its squared error over the tolerance."""
-    last: Value
-    """The same of the last step that was accepted."""
-
-
 def limited_step(w: Code, field: Field, rows: Layout, phase: Callable[[], Value], step: Value) -> Value:
     """The step, shortened to end near an abrupt change of the law."""
     n, state, rate = field.dimension, rows["state"][0], rows["rate"][0]
     near = w.all([*range(state, state + n), *range(rate, rate + n)])
     leading = [phase(), *near]
     arguments = [*leading, *fixed_numbers(w, field, rows, field.abrupt, len(leading))]
-    (distance, speed), w.block = w.program(field.abrupt, arguments, w.block)
+    distance, speed = w.program(field.abrupt, arguments)
     time = w.larger(w.div(distance, w.add(speed, number(1e-9))), number(NEAREST))
     return w.smaller(w.widened(time), step)
 
@@ -87,16 +69,21 @@ def squared_error(w: Code, field: Field, rows: Layout, tableau: Tableau, step: V
     return w.larger(w.smaller(error, number(1e12)), number(1e-12))  # a NaN becomes the largest error
 
 
-def next_step(w: Code, order: int, tried: Tried, largest: Value) -> Value:
+def next_step(
+    w: Code, order: int, step: Value, limited: Value, shorter: Value, fine: Value, bits: Value, last: Value, most: Value
+) -> Value:
     """The size of the next step; its factors are powers of the squared error: 0.7/order of this step and -0.4/order of
-    the last one."""
-    step, limited, ends, halves, fine, bits, last = tried
+    the last one.
+
+    **Arguments:** order of the method; the step; its size before it was shortened to end at the strobe state or half
+    way to it; masks: it was shortened so, its error is allowed; binary logarithms of its squared error over the
+    tolerance, and of that of the last step that was accepted; largest step.
+    """
     power = 0.5 / order
     grown = w.sub(w.mul(last, number(0.4 * power)), w.mul(bits, number(0.7 * power)))
     factor = w.add(w.select(fine, grown, w.mul(bits, number(-power))), number(math.log2(SAFETY)))
     factor = w.smaller(factor, w.select(fine, number(math.log2(MOST_FACTOR)), number(-0.2)))
     factor = w.exp2(w.larger(factor, number(math.log2(LEAST_FACTOR))))
     proposed = w.mul(step, factor)
-    shorter = w.simple("or", ends, halves)
     proposed = w.select(w.both(fine, shorter), w.larger(proposed, limited), proposed)
-    return w.smaller(proposed, largest)
+    return w.smaller(proposed, most)

@@ -4,28 +4,15 @@ Simulation, sweeps, exponents, orbits and gradients all advance through it, so t
 once. It is differentiable (forward mode) with respect to state, speed and every parameter of the system.
 """
 
-from collections.abc import Sequence
-
-import diffrax as dfx
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Int
 
 from .._arguments import require_x64
-from .._pytrees import Scalar, State, split
+from .._pytrees import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem, require_speeds
-from .kernel import REVOLUTION, Pieces, steps_through
-from .method import (
-    AbstractMethod,
-    FixedSteps,
-    Moved,
-    Stretch,
-    Tangents,
-    method as method_of,
-    moved_by,
-    result_at,
-)
-from .outcomes import outcome_code
+from .kernel import REVOLUTION, Parts, Pieces, Tangents
+from .method import AbstractMethod, Stretch, method as method_of
 
 
 class StrobeMap(eqx.Module):
@@ -36,14 +23,18 @@ class StrobeMap(eqx.Module):
     scale: State
     method: AbstractMethod
 
-    def __call__(self, y: State) -> Stretch:
-        """One revolution from `y`: state after it, largest excursion on the way, outcome."""
-        return self.part(y, 0, 1)
+    def __call__(self, y: State, tangents: Tangents = ()) -> Stretch:
+        """One revolution from `y`: state after it, largest excursion on the way, outcome, tangent vectors.
 
-    def part(self, y: State, i: Int[Array, ""] | int, parts: Int[Array, ""] | Scalar) -> Stretch:
+        **Arguments:** state; tangent vectors in units of the state, each with the tangents of the field's numbers along
+        which the field changes too, or None.
+        """
+        return self.part(y, 0, 1, tangents)
+
+    def part(self, y: State, i: Int[Array, ""] | int, parts: Parts, tangents: Tangents = ()) -> Stretch:
         """The `i`-th of `parts` equal parts of a revolution."""
         phase = jnp.asarray(i, dtype=float) * (REVOLUTION / jnp.asarray(parts, dtype=float))
-        return self.method.advance(Pieces(self.field, self.system, self.scale), y, phase, parts)
+        return self.method.advance(Pieces(self.field, self.system, self.scale), y, phase, parts, tangents)
 
 
 def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod | None = None) -> StrobeMap:
@@ -57,29 +48,3 @@ def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMeth
     chosen = method_of() if method is None else method
     speed = jnp.asarray(speed, dtype=float)
     return StrobeMap(system.at_speed(speed), system, system.scale(speed), chosen)
-
-
-Drift = Sequence[Scalar | None]
-"""Tangents of the numbers of a field, in the order of its leaves; None where there is none."""
-
-
-def pushed(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Drift | None]) -> Moved:
-    """A lane one revolution on, with tangent vectors along which the field changes too.
-
-    **Arguments:** strobe map; state; tangent vectors (in units of the state), and for each of them the tangents of the
-    field's numbers, None where there are none.
-    """
-    method = strobe.method
-    if isinstance(method, FixedSteps):
-        pieces = Pieces(strobe.field, strobe.system, strobe.scale)
-        y, peak, after = steps_through(method.solver, method.steps, pieces, y, tangents, drifts)
-        return Moved(y, after, peak, outcome_code(result_at(dfx.RESULTS.successful, y, peak)))
-    form, row = split(strobe.field, eqx.is_inexact_array)
-
-    def advance(start: tuple[State, list[Array]]) -> Stretch:
-        y, row = start
-        return eqx.tree_at(lambda s: s.field, strobe, form.filled(row))(y)
-
-    zero = list(map(jnp.zeros_like, row))
-    filled = [[z if d is None else d for z, d in zip(zero, drift or zero, strict=True)] for drift in drifts]
-    return moved_by(advance, (y, row), list(zip(tangents, filled, strict=True)))

@@ -1,11 +1,10 @@
 """Machine code that JAX's compiled programs call, by XLA's typed interface for functions of others.
 
-The interface hands over one struct. Where its fields are is read from the header that jaxlib ships, so that a version
-of JAX that moves them is met as it is, and one that changes them beyond recognition is found out.
+XLA hands over one struct, whose layout is that of version 0 of the interface (`xla/ffi/api/c_api.h` in the folder
+`jax.ffi.include_dir()`); smaller changes have numbers of their own, and leave the fields that are read here in place.
 """
 
 import ctypes
-import functools
 import pathlib
 import re
 import threading
@@ -15,79 +14,45 @@ import jax
 from .object_code import function
 
 
-FRAME, ARGUMENTS, RESULTS, BUFFER = (f"XLA_FFI_{name}" for name in ("CallFrame", "Args", "Rets", "Buffer"))
-EXTENSION, METADATA, VERSION = (f"XLA_FFI_{name}" for name in ("Metadata_Extension", "Metadata", "Api_Version"))
-POINTER = 8
+MAJOR = 0
+"""Version of the interface that is known here."""
 
 
 class UnknownInterface(Exception):
     """The interface of this version of jaxlib is not the one that is known here."""
 
 
-class Header:
-    """Structs of a header in C, as far as they are made of pointers, integers, enumerations and structs before them."""
+HANDLER = """%Version = type {{ i64, ptr, i32, i32 }}
+%Metadata = type {{ i64, %Version, i32 }}
+%Extension = type {{ i64, i32, ptr, ptr }}
+%Buffers = type {{ i64, ptr, i64, ptr, ptr }}
+%Buffer = type {{ i64, ptr, i32, ptr }}
+%Frame = type {{ i64, ptr, ptr, ptr, i32, %Buffers, %Buffers }}
 
-    def __init__(self, text: str):
-        text = re.sub(r"//[^\n]*|/\*.*?\*/", "", text, flags=re.S)
-        self._text, self._sizes = text, {"size_t": POINTER, "int64_t": 8, "uint64_t": 8}
-        self._offsets: dict[str, dict[str, tuple[int, str]]] = {}
-        for name, body in re.findall(r"struct (\w+) \{([^{}]*)\}", text):
-            self._offsets[name], at, widest = {}, 0, 1
-            for kind, field in re.findall(r"([\w\s]+[\s*]+)(\w+);", body):
-                kind = kind.strip()
-                size = POINTER if kind.endswith("*") else self._sizes.get(kind, 4)
-                aligned = min(size, POINTER)
-                at, widest = -(-at // aligned) * aligned, max(widest, aligned)
-                self._offsets[name][field] = at, kind
-                at += size
-            self._sizes[name] = -(-at // widest) * widest
-
-    def at(self, struct: str, *fields: str) -> int:
-        """Offset of a field of a struct, or of a field of that."""
-        try:
-            offset, kind = self._offsets[struct][fields[0]]
-            return offset + (self.at(kind, *fields[1:]) if len(fields) > 1 else 0)
-        except KeyError as error:
-            raise UnknownInterface(f"{struct}.{'.'.join(fields)}") from error
-
-    def number(self, pattern: str) -> int:
-        """The number behind a pattern."""
-        found = re.search(pattern + r"\s*=?\s*(\d+)", self._text)
-        if found is None:
-            raise UnknownInterface(pattern)
-        return int(found[1])
-
-
-@functools.cache
-def header() -> Header:
-    """The header of this jaxlib."""
-    return Header((pathlib.Path(jax.ffi.include_dir()) / "xla/ffi/api/c_api.h").read_text())
-
-
-HANDLER = """define ptr @handler(ptr %frame) {{
-  %extension_at = getelementptr i8, ptr %frame, i64 {extension}
+define ptr @handler(ptr %frame) {{
+  %extension_at = getelementptr %Frame, ptr %frame, i32 0, i32 1
   %extension = load ptr, ptr %extension_at
   %plain = icmp eq ptr %extension, null
   br i1 %plain, label %execute, label %extended
 extended:
-  %kind_at = getelementptr i8, ptr %extension, i64 {kind}
+  %kind_at = getelementptr %Extension, ptr %extension, i32 0, i32 1
   %kind = load i32, ptr %kind_at
-  %asks = icmp eq i32 %kind, {asks}
+  %asks = icmp eq i32 %kind, 1
   br i1 %asks, label %answer, label %execute
 answer:
-  %about_at = getelementptr i8, ptr %extension, i64 {about}
+  %about_at = getelementptr %Extension, ptr %extension, i32 0, i32 3
   %about = load ptr, ptr %about_at
-  %major = getelementptr i8, ptr %about, i64 {major_at}
+  %major = getelementptr %Metadata, ptr %about, i32 0, i32 1, i32 2
   store i32 {major}, ptr %major
-  %minor = getelementptr i8, ptr %about, i64 {minor_at}
+  %minor = getelementptr %Metadata, ptr %about, i32 0, i32 1, i32 3
   store i32 {minor}, ptr %minor
-  %traits = getelementptr i8, ptr %about, i64 {traits}
+  %traits = getelementptr %Metadata, ptr %about, i32 0, i32 2
   store i32 0, ptr %traits
   ret ptr null
 execute:
-  %arguments_at = getelementptr i8, ptr %frame, i64 {arguments}
+  %arguments_at = getelementptr %Frame, ptr %frame, i32 0, i32 5, i32 4
   %arguments = load ptr, ptr %arguments_at
-  %results_at = getelementptr i8, ptr %frame, i64 {results}
+  %results_at = getelementptr %Frame, ptr %frame, i32 0, i32 6, i32 4
   %results = load ptr, ptr %results_at
   %in = alloca ptr, i64 {inputs}
   %out = alloca ptr, i64 {outputs}
@@ -103,7 +68,7 @@ next:
   %k = phi i64 [ 0, %entry ], [ %k_next, %next ]
   %buffer_at = getelementptr ptr, ptr %buffers, i64 %k
   %buffer = load ptr, ptr %buffer_at
-  %data_at = getelementptr i8, ptr %buffer, i64 {data}
+  %data_at = getelementptr %Buffer, ptr %buffer, i32 0, i32 3
   %data = load ptr, ptr %data_at
   %place = getelementptr ptr, ptr %to, i64 %k
   store ptr %data, ptr %place
@@ -114,7 +79,7 @@ done:
   ret void
 }}
 """
-"""XLA's function: it answers what XLA asks of it once, and calls `march(inputs, outputs)`."""
+"""XLA's function: it answers what XLA asks once (extension 1: its version), and calls `march(inputs, outputs)`."""
 
 
 def handler_ir(inputs: int, outputs: int) -> str:
@@ -122,34 +87,21 @@ def handler_ir(inputs: int, outputs: int) -> str:
 
     **Raises:** `UnknownInterface`.
     """
-    h = header()
-    return HANDLER.format(
-        extension=h.at(FRAME, "extension_start"),
-        kind=h.at(EXTENSION, "extension_base", "type"),
-        asks=h.number("XLA_FFI_Extension_Metadata"),
-        about=h.at(EXTENSION, "metadata"),
-        major_at=h.at(METADATA, "api_version", "major_version"),
-        minor_at=h.at(METADATA, "api_version", "minor_version"),
-        major=h.number("XLA_FFI_API_MAJOR"),
-        minor=h.number("XLA_FFI_API_MINOR"),
-        traits=h.at(METADATA, "traits"),
-        arguments=h.at(FRAME, "args", "args"),
-        results=h.at(FRAME, "rets", "rets"),
-        data=h.at(BUFFER, "data"),
-        inputs=inputs,
-        outputs=outputs,
-    )
+    header = (pathlib.Path(jax.ffi.include_dir()) / "xla/ffi/api/c_api.h").read_text()
+    found = re.search(r"XLA_FFI_API_MAJOR (\d+).*XLA_FFI_API_MINOR (\d+)", header, re.DOTALL)
+    if found is None or int(found[1]) != MAJOR:
+        raise UnknownInterface("XLA's interface")
+    return HANDLER.format(major=MAJOR, minor=found[2], inputs=inputs, outputs=outputs)
 
 
 _registered: dict[str, int] = {}
 _registering = threading.Lock()
 
 
-def registered(ir: str, name: str) -> int:
+def registered(ir: str, name: str) -> None:
     """Have XLA know the `handler` of a module by a name; the code stays as long as the process."""
     address = function(ir, "handler")
     with _registering:  # threads may trace the same function at the same time
         if name not in _registered:
             jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(ctypes.c_void_p(address)), platform="cpu")
             _registered[name] = address
-    return address
