@@ -87,7 +87,7 @@ class Planted:
 @pytest.fixture
 def planted(monkeypatch: pytest.MonkeyPatch):
     def plant(seed: int, **law: float) -> None:
-        monkeypatch.setattr("jaxcage.design.survival_edges._escapes", Planted(seed, **law))
+        monkeypatch.setattr("jaxcage.design.lasting_edges._escapes", Planted(seed, **law))
 
     return plant
 
@@ -100,11 +100,11 @@ def test_planted_edges_and_elasticities_lie_within_their_errors(planted, curvatu
     for seed in range(40):
         planted(seed, curvature=curvature)
         found = lasting_edge(CASE, 12100.0, 150.0, names=NAMES, seed=seed)
-        error = np.array([found.speed_rpm - EDGE, *(found.elasticity - ELASTICITY), found.sum_of(*NAMES)[0] - 0.2])
-        stated = np.array([found.standard_error_rpm, *found.elasticity_error, found.sum_of(*NAMES)[1]])
+        error = np.array([found.value - EDGE, *(found.elasticity - ELASTICITY), found.elasticity_of(*NAMES)[0] - 0.2])
+        stated = np.array([found.value_error, *found.elasticity_error, found.elasticity_of(*NAMES)[1]])
         inside += np.abs(error) < errors * stated
         steady += found.status == "converged"
-        assert found.standard_error_rpm < 30 and np.all(found.elasticity_error < 0.15)
+        assert found.value_error < 30 and np.all(found.elasticity_error < 0.15)
     assert np.all(inside >= most) and steady >= 36
 
 
@@ -125,8 +125,8 @@ def test_an_open_zone_has_no_width_and_the_gradient_of_its_one_edge(planted):
         assert width.open and width.trusted and width.status == f"open: no {missing} within the range"
         assert width.width_rpm is None and width.standard_error_rpm is None
         by, error = width.change(*NAMES)
-        assert by == pytest.approx(sign * found.speed_rpm * found.sum_of(*NAMES)[0])
-        assert error == pytest.approx(found.speed_rpm * found.sum_of(*NAMES)[1])
+        assert by == pytest.approx(sign * found.value * found.elasticity_of(*NAMES)[0])
+        assert error == pytest.approx(found.value * found.elasticity_of(*NAMES)[1])
     with pytest.raises(ValueError, match="`zone` must be one with an edge among zone 2 exit, but is 1"):
         zone_width({"zone 2 exit": found})
     with pytest.raises(ValueError, match="`names` must be among guidance_gap, eccentricity, but has 'gap'"):

@@ -1,14 +1,13 @@
 """Designs for calm operation: the lowest cost at which all requirements hold, by exact gradients.
 
 Requirements are constraints of sequential programmes within a trust region, each solved by SciPy's SLSQP, or of an
-augmented Lagrangian whose descent is optax's. A step at which an edge is lost is halved. With tolerances each
-requirement is that of the worst bearing within them: the gradient names the corner, and the edges are solved for there.
-The derivatives there are those of the worst case (the envelope theorem).
+augmented Lagrangian whose descent is optax's. With tolerances each requirement is that of the worst bearing within
+them: the gradient names the corner, and the edges are solved for there. The derivatives there are those of the worst
+case (the envelope theorem).
 """
 
-import abc
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -24,16 +23,25 @@ from ..lanes import sobol
 from ..models import AbstractForcedSystem
 from ..solve import AbstractMethod
 from .check import Checked, check_design
-from .operating import DesignSpace, OperatingRange, Value, function_value
-from .requirements import Cost, Requirement, Requirements, balance_grade, cost_function, listed, values_at
-from .tolerance import Budget, Tolerance, budget_of, corner, widened
-from .unstable_width import UnstableWidth
+from .design_space import DesignSpace, Value, function_value
+from .operating import KEPT, OperatingRange, UnstableWidth
+from .requirements import (
+    Budget,
+    Cost,
+    Requirement,
+    Requirements,
+    Tolerance,
+    budget_of,
+    corner,
+    cost_function,
+    listed,
+    widened,
+)
 
 
 AT_BOUND = 1e-6  # distance from a bound, over both bounds' distance, of a place at it
 WIDEST = 4.0  # largest multiple of a tolerance that is tried
 LOST = 10.0  # slack of every requirement, negative, at a trial that has no values
-KEPT = 1e-3  # slack, negative, at which a requirement still counts as kept
 ACTIVE = 5e-3  # slack below which a requirement takes part in the cost
 NEAR_STOP = 0.03  # distance of a trial that lost an edge, over the bounds, at which it stops the search
 ITERATIONS, ACCURACY = 30, 1e-4
@@ -110,21 +118,30 @@ class Design:
         return "\n".join(rows)
 
 
-class _Problem(abc.ABC):
-    """Trials of one search, each computed once."""
+class Problem:
+    """Trials of one search, each computed once.
 
-    def __init__(self, space: DesignSpace, operating: tuple[float, float], wanted: list[Requirement], free: np.ndarray):
-        self.space, self.operating, self.wanted, self.free = space, operating, wanted, free
+    **Arguments:** operating range, or width of unstable ranges, which is then the cost; requirements; cost; parameters
+    that vary; tolerances.
+    """
+
+    def __init__(
+        self,
+        range_: OperatingRange | UnstableWidth,
+        wanted: list[Requirement],
+        cost: Callable[[Any], Any] | None,
+        free: np.ndarray,
+        tolerance: Mapping[str, Tolerance],
+    ):
+        self.space, self.operating, self.wanted, self.free = range_.space, range_.operating, wanted, free
+        self.range, self.cost, self.tolerance = range_, cost, tolerance
         self.trials: dict[bytes, Trial] = {}
-        self.notes: list[str] = []
+        self.solved: dict[bytes, dict[str, Value] | str] = {}
 
-    @abc.abstractmethod
-    def compute(self, place: np.ndarray) -> Trial:
-        """The trial at a place."""
-
-    def foreseen(self, trial: Trial, place: np.ndarray) -> tuple[float, np.ndarray]:
-        """The cost near a trial and its derivatives, to first order where it is dear to compute."""
-        return trial.cost + float(trial.cost_slope @ (place - trial.place)), trial.cost_slope
+    @property
+    def evaluations(self) -> int:
+        """Designs whose edges were solved for."""
+        return len(self.solved)
 
     def at(self, place: np.ndarray) -> Trial:
         """The trial at a place."""
@@ -134,82 +151,46 @@ class _Problem(abc.ABC):
             self.trials[key] = self.compute(place)
         return self.trials[key]
 
+    def compute(self, place: np.ndarray) -> Trial:
+        """The trial at a place."""
+        values = self._values(place)
+        lost = isinstance(values, str)
+        cost, slope = (np.inf, np.zeros(place.size)) if lost and self.cost is None else self.priced_at(place, values)
+        worst = values if lost else self.worst(place, values, self.tolerance)
+        if lost or isinstance(worst, str):
+            why = worst if lost else f"within the tolerances: {worst}"
+            m, n = len(self.wanted), place.size
+            return Trial(place, cost, slope, np.full(m, -LOST), np.zeros((m, n)), {}, {}, str(why))
+        pairs = [r.slack(worst[r.name]) for r in self.wanted]
+        slack, by = np.array([s for s, _ in pairs]), np.array([d for _, d in pairs]).reshape(-1, place.size)
+        return Trial(place, cost, slope, slack, by, values, worst)
+
+    def priced_at(self, place: np.ndarray, values: Any = None) -> tuple[float, np.ndarray]:
+        """The cost at a place and its derivatives."""
+        if self.cost is None:
+            return values["width"].value, values["width"].slope
+        value, slope = function_value(self.cost, self.space, jnp.asarray(place))
+        return float(value), np.asarray(slope)
+
+    def foreseen(self, trial: Trial, place: np.ndarray) -> tuple[float, np.ndarray]:
+        """The cost near a trial and its derivatives, to first order where it is dear to compute."""
+        if self.cost is not None:
+            return self.priced_at(place)
+        return trial.cost + float(trial.cost_slope @ (place - trial.place)), trial.cost_slope
+
     def priced(self, trial: Trial, size: float) -> float:
         """The cost over a size, and what the worst requirement falls short at its price: one number to be made small,
         also for a search without derivatives."""
         return trial.cost / size + PENALTY * max(0.0, -float(np.min(trial.slack, initial=np.inf)))
 
-    def nowhere(self, place: np.ndarray, cost: float, slope: np.ndarray, why: str) -> Trial:
-        """A trial at which an edge is lost."""
-        m, n = len(self.wanted), place.size
-        return Trial(place, cost, slope, np.full(m, -LOST), np.zeros((m, n)), {}, {}, why)
-
-    @property
-    def evaluations(self) -> int:
-        """Designs whose edges were solved for."""
-        return len(self.trials)
-
-    def whole(self, x: np.ndarray, like: np.ndarray) -> np.ndarray:
-        """The place of the parameters that vary, the others as they are at `like`."""
-        place = like.copy()
-        place[self.free] = x
-        return place
-
-
-class CostProblem(_Problem):
-    """Requirements over an operating range, and a cost that is cheap to compute.
-
-    **Arguments:** operating range; requirements; cost; parameters that vary; tolerances.
-    """
-
-    def __init__(
-        self,
-        range_: OperatingRange,
-        wanted: list[Requirement],
-        cost: Callable[[Any], Any],
-        free: np.ndarray,
-        tolerance: Mapping[str, Tolerance],
-    ):
-        super().__init__(range_.space, range_.operating, wanted, free)
-        self.range, self.cost, self.tolerance, self.notes = range_, cost, tolerance, range_.handed_over
-        self.solved: dict[bytes, dict[str, Value] | str] = {}
-
-    def foreseen(self, trial: Trial, place: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = function_value(self.cost, self.space, jnp.asarray(place))
-        return float(value), np.asarray(slope)
-
-    @property
-    def evaluations(self) -> int:
-        return len(self.solved)
-
     def _values(self, place: np.ndarray) -> dict[str, Value] | str:
         """Values of one bearing; or why there are none."""
         key = place.tobytes()
         if key not in self.solved:
-            before = len(self.notes)
-            values = values_at(self.range, place, self.wanted)
-            if not isinstance(values, str) and len(self.notes) > before:
-                if min(r.slack(values[r.of])[0] for r in self.wanted[:2]) < -KEPT:
-                    values = "; ".join(self.notes[before:])  # the wrong side of a jump, where no slope leads back
-                    self.range.forget(place)
-            self.solved[key] = values
+            self.solved[key] = self.range.values(place, self.wanted)
         return self.solved[key]
 
-    def compute(self, place: np.ndarray) -> Trial:
-        value, slope = function_value(self.cost, self.space, jnp.asarray(place))
-        cost, values = (float(value), np.asarray(slope)), self._values(place)
-        if isinstance(values, str):
-            return self.nowhere(place, *cost, values)
-        made = self.worst(place, values, self.tolerance)
-        if isinstance(made, str):
-            return self.nowhere(place, *cost, f"within the tolerances: {made}")
-        pairs = [r.slack(made[r.name]) for r in self.wanted]
-        slack, by = (np.array(x) for x in zip(*pairs, strict=True))
-        return Trial(place, *cost, slack, by, values, made)
-
-    def worst(
-        self, place: np.ndarray, values: dict[str, Value], tolerance: Mapping[str, Tolerance]
-    ) -> dict[str, Value] | str:
+    def worst(self, place: np.ndarray, values: Any, tolerance: Mapping[str, Tolerance]) -> dict[str, Value] | str:
         """What each requirement concerns for the worst bearing within tolerances; or why that is not known."""
         found = {}
         for r in self.wanted:
@@ -227,25 +208,11 @@ class CostProblem(_Problem):
             return made
         return next((r.name for r in self.wanted if r.slack(made[r.name])[0] < -KEPT), "")
 
-
-class _WidthProblem(_Problem):
-    """The width of unstable ranges, and a balance grade as the only requirement."""
-
-    def __init__(self, width: UnstableWidth, keep: Requirements, free: np.ndarray):
-        if others := [n for n in ("decay", "film", "land_force", "drag") if getattr(keep, n) is not None]:
-            raise ArgumentError("keep", said=f"must have no {others[0]} where the width is the objective.")
-        wanted = [r for r in listed(keep, width.space.system) if r.of == "balance"]
-        super().__init__(width.space, width.operating, wanted, free)
-        self.width = width
-
-    def compute(self, place: np.ndarray) -> Trial:
-        found = self.width.at(place)
-        if isinstance(found, str):
-            return self.nowhere(place, float("inf"), np.zeros(place.size), found)
-        values = {"width": found} | {r.of: balance_grade(self.space, self.operating, place) for r in self.wanted}
-        pairs = [r.slack(values[r.of]) for r in self.wanted]
-        slack, by = np.array([s for s, _ in pairs]), np.array([d for _, d in pairs]).reshape(-1, place.size)
-        return Trial(place, found.value, found.slope, slack, by, values, {})
+    def whole(self, x: np.ndarray, like: np.ndarray) -> np.ndarray:
+        """The place of the parameters that vary, the others as they are at `like`."""
+        place = like.copy()
+        place[self.free] = x
+        return place
 
 
 def design_for(
@@ -301,10 +268,13 @@ def design_for(
     say = progress or (lambda what, done, of: None)
     say("edges of the given design", 0, 1)
     if objective == "width":
-        problem: _Problem = _WidthProblem(UnstableWidth(space, operating, method), keep, free)
+        if others := [n for n in ("decay", "film", "land_force", "drag") if getattr(keep, n) is not None]:
+            raise ArgumentError("keep", said=f"must have no {others[0]} where the width is the objective.")
+        wanted = [r for r in listed(keep, model) if r.of == "balance"]
+        problem = Problem(UnstableWidth(space, operating, method=method), wanted, None, free, tolerance)
     else:
         range_ = OperatingRange(space, operating, keep.margin, method)
-        problem = CostProblem(range_, listed(keep, model), cost_function(cost, model), free, tolerance)
+        problem = Problem(range_, listed(keep, model), cost_function(cost, model), free, tolerance)
     own = np.where(free, np.clip(space.place, 0, 1), space.place)
     count = int(free.sum())
     places = [own] + [problem.whole(x, own) for x in sobol(count, max(starts, 2), seed)[: starts - 1]]
@@ -315,7 +285,7 @@ def design_for(
     return _described(problem, min(found, key=lambda place: _merit(problem, place)), tolerance, check, say)
 
 
-def _merit(problem: _Problem, place: np.ndarray) -> tuple[float, float]:
+def _merit(problem: Problem, place: np.ndarray) -> tuple[float, float]:
     """Order of designs: by what they fall short, then by cost."""
     trial = problem.at(place)
     return float(np.max(np.maximum(-trial.slack - KEPT, 0), initial=0.0)), trial.cost
@@ -324,7 +294,7 @@ def _merit(problem: _Problem, place: np.ndarray) -> tuple[float, float]:
 # --- searches -------------------------------------------------------------------------------------------------------
 
 
-def _programme(problem: _Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
+def _programme(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
     """The best place by sequential programmes within a trust region.
 
     Each programme has the cost itself, where it is cheap, and the requirements linearised with their exact derivatives;
@@ -333,9 +303,9 @@ def _programme(problem: _Problem, begin: np.ndarray, say: Callable[[int], None])
     the cost, so that the search leads to a feasible place or, where there is none, to the least shortfall.
     """
     trial, radius, largest = problem.at(begin), FIRST_RADIUS, LARGEST_RADIUS
-    size = max(abs(trial.cost), 1e-12)
+    size, refused = max(abs(trial.cost), 1e-12), list[Trial]()
     for turn in range(ITERATIONS):
-        step, foreseen = _step(problem, trial, radius, size)
+        step, foreseen = _step(problem, trial, refused, radius, size)
         gain = problem.priced(trial, size) - foreseen
         if gain < ACCURACY or radius < LEAST_RADIUS:
             break
@@ -343,19 +313,30 @@ def _programme(problem: _Problem, begin: np.ndarray, say: Callable[[int], None])
         kept = (problem.priced(trial, size) - problem.priced(new, size)) / gain
         if kept < 0.25 or new.lost:
             radius = min(radius, float(np.max(np.abs(step)))) / 2
-            largest = radius / 2 if new.lost else largest  # after this step a longer one would lose the edge again
+            largest = radius / 2 if new.lost else largest  # a longer step would lose the edge again
         elif kept > 0.75:
-            radius = min(2 * radius, largest)
+            radius, largest = min(2 * radius, largest), min(2 * largest, LARGEST_RADIUS)
         if kept > 0.1 and not new.lost:
-            trial = new
+            trial, refused = new, []
+        elif not new.lost:
+            refused.append(new)
         say(turn + 1)
     return trial.place
 
 
-def _step(problem: _Problem, trial: Trial, radius: float, size: float) -> tuple[np.ndarray, float]:
-    """The step within a radius to where the linearised requirements hold at the least cost, and the merit there."""
-    x, slack = trial.place[problem.free], trial.slack
-    slope, last = trial.slack_slope[:, problem.free], np.append(np.zeros(x.size), PENALTY)
+def _step(
+    problem: Problem, trial: Trial, refused: Sequence[Trial], radius: float, size: float
+) -> tuple[np.ndarray, float]:
+    """The step within a radius to where the linearised requirements hold at the least cost, and the merit there.
+
+    Requirements that were linearised at refused trials hold too, such as those of another corner of the tolerances. At
+    the trial itself they may fall no shorter than it does, where a requirement bends the other way.
+    """
+    x = trial.place[problem.free]
+    below = [np.maximum(t.slack + t.slack_slope @ (trial.place - t.place), trial.slack) for t in refused]
+    slack = np.concatenate([trial.slack, *below])
+    slope = np.concatenate([trial.slack_slope, *(t.slack_slope for t in refused)])[:, problem.free]
+    last = np.append(np.zeros(x.size), PENALTY)
     bounds = [(max(-radius, -v), min(radius, 1 - v)) for v in x]
 
     def cost(z: np.ndarray) -> tuple[float, np.ndarray]:
@@ -380,7 +361,7 @@ def _step(problem: _Problem, trial: Trial, radius: float, size: float) -> tuple[
     return step, problem.foreseen(trial, problem.whole(x + step, trial.place))[0] / size + PENALTY * short
 
 
-def _augmented(problem: _Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
+def _augmented(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
     """The same by optax's Adam on an augmented Lagrangian, whose multipliers are renewed eight times."""
     place, weight, rounds, steps = begin.copy(), 10.0, 8, 12
     multiplier = np.zeros(len(problem.wanted))
@@ -423,7 +404,7 @@ def _weights(slopes: np.ndarray, x: np.ndarray, objective: np.ndarray) -> tuple[
     return found[: len(slopes)], of_bound
 
 
-def _conflict(problem: _Problem, trial: Trial, names: list[str]) -> tuple[str, ...]:
+def _conflict(problem: Problem, trial: Trial, names: list[str]) -> tuple[str, ...]:
     """Requirements and bounds that together forbid a feasible design: at the least shortfall some weights make the
     slopes of the worst requirements vanish, up to bounds."""
     worst = np.flatnonzero(trial.slack < trial.slack.min() + ACTIVE)
@@ -435,7 +416,7 @@ def _conflict(problem: _Problem, trial: Trial, names: list[str]) -> tuple[str, .
     return (*against, *(f"the bound of {n}" for n, w in zip(names, bounds, strict=False) if w > 1e-3 * size))
 
 
-def _budget(problem: CostProblem, trial: Trial, tolerance: Mapping[str, Tolerance]) -> list[Budget]:
+def _budget(problem: Problem, trial: Trial, tolerance: Mapping[str, Tolerance]) -> list[Budget]:
     """How wide each tolerance may be while the others stay: foreseen at first order, then solved for at the corners,
     and less wide until all requirements hold there."""
     rows = []
@@ -450,14 +431,14 @@ def _budget(problem: CostProblem, trial: Trial, tolerance: Mapping[str, Toleranc
     return rows
 
 
-def _stop(problem: _Problem, best: np.ndarray) -> str:
+def _stop(problem: Problem, best: np.ndarray) -> str:
     """What a further step would have lost, if the search ended for that reason."""
     near = [t for t in problem.trials.values() if t.lost and float(np.max(np.abs(t.place - best))) < NEAR_STOP]
     return near[-1].lost if near else ""
 
 
 def _described(
-    problem: _Problem,
+    problem: Problem,
     best: np.ndarray,
     tolerance: Mapping[str, Tolerance],
     check: int,
@@ -490,9 +471,9 @@ def _described(
         prices=prices,
         at_bound=tuple(n for n, v in zip(names, x, strict=True) if min(v, 1 - v) < AT_BOUND),
         worst=trial.worst,
-        budget=_budget(problem, trial, tolerance) if isinstance(problem, CostProblem) and feasible else [],
+        budget=_budget(problem, trial, tolerance) if problem.cost is not None and feasible else [],
         stopped_by=_stop(problem, best),
-        notes=tuple(dict.fromkeys(problem.notes)),
+        notes=tuple(dict.fromkeys(problem.range.handed_over)),
         evaluations=problem.evaluations,
         path=[space.values(t.place) | {"cost": t.cost} for t in problem.trials.values() if not t.lost],
         checked=check_design(space.model(best), problem.operating, check, say) if check and not trial.lost else None,

@@ -138,11 +138,12 @@ def _with_errors(found: Mapping[str, tuple[float, float]], factor: float = 1.0) 
 
 def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int, beside: Beside = None) -> Table:
     """Edges of lasting chaos, and their elasticities."""
-    names = next(iter(edges.values())).names
+    names = next(iter(edges.values())).directions
     rows = [
-        {"name": each, **chosen(edge, "speed_rpm standard_error_rpm horizon status")}
+        {"name": each, "speed_rpm": edge.value, "standard_error_rpm": edge.value_error}
+        | chosen(edge, "horizon status")
         | {"escapes": f"{edge.fit.escapes} of {edge.fit.lanes}"}
-        | _with_errors({n: edge.sum_of(*of) for n, of in _asked(names).items()})
+        | _with_errors({n: edge.elasticity_of(*of) for n, of in _asked(names).items()})
         for each, edge in edges.items()
     ]
     columns = [Column("edge", (), key="name")]

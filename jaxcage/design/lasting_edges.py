@@ -16,13 +16,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._errors import ArgumentError
-from .._parameters import parameters, replace
+from .._parameters import replace
 from ..analysis import LIFE_BLOCK, Hazard, Zone, hazard
 from ..lanes import Plan, Progress, Run, run_lanes
 from ..models import CageModel
 from ..orbits import Sensitivity
 from ..quantities import notebook_html
 from ..solve import AbstractMethod
+from .slopes import Slopes, moved_parameters
 
 
 NAMES = ("guidance_gap", "eccentricity")
@@ -42,15 +43,9 @@ CERTAIN = 3.0
 
 
 @dataclasses.dataclass(frozen=True)
-class LastingEdge:
-    """Speed at which the mean life of chaos passes the horizon, and its elasticities."""
+class LastingEdge(Slopes):
+    """Speed [rpm] at which the mean life of chaos passes the horizon, and its slopes."""
 
-    speed_rpm: float
-    names: tuple[str, ...]
-    elasticity: Float[np.ndarray, " n"]
-    """Relative change of the edge by that of each parameter."""
-    covariance: Float[np.ndarray, "1+n 1+n"]
-    """Covariance of the speed [rpm] and the elasticities."""
     horizon: int
     window_rpm: tuple[float, float]
     """Middle and half width of the speeds of the last round."""
@@ -62,35 +57,14 @@ class LastingEdge:
     def status(self) -> str:
         """`converged`, or why the numbers should not be used."""
         middle, half = self.window_rpm
-        if not max(abs(self.speed_rpm - middle), CERTAIN * self.standard_error_rpm) < half:
+        if not max(abs(self.value - middle), CERTAIN * self.value_error) < half:
             return "no edge: the mean life does not pass the horizon among these speeds"
         return "converged" if self.fit.p_value >= LIKELY else "the rate of escapes is not log-linear here"
 
-    @property
-    def standard_error_rpm(self) -> float:
-        """Standard error of the speed."""
-        return math.sqrt(self.covariance[0, 0])
-
-    @property
-    def elasticity_error(self) -> Float[np.ndarray, " n"]:
-        """Standard error of each elasticity."""
-        return np.sqrt(np.diag(self.covariance)[1:])
-
-    def sum_of(self, *names: str) -> tuple[float, float]:
-        """Elasticity by several parameters that change together, such as gap and eccentricity at a fixed ratio, with
-        its standard error.
-
-        **Raises:** `ValueError` for a parameter without an elasticity.
-        """
-        if unknown := [name for name in names if name not in self.names]:
-            raise ArgumentError("names", said=f"must be among {', '.join(self.names)}, but has '{unknown[0]}'.")
-        weight = np.array([0.0, *(float(n in names) for n in self.names)])
-        return float(weight[1:] @ self.elasticity), math.sqrt(weight @ self.covariance @ weight)
-
     def __str__(self) -> str:
         lanes = f"{self.fit.escapes} of {self.fit.lanes} chaotic lanes escaped by revolution {self.horizon}"
-        head = f"{self.speed_rpm:.0f} +- {self.standard_error_rpm:.0f} rpm, elasticities ({lanes}; {self.status})"
-        each = zip(self.names, self.elasticity, self.elasticity_error, strict=True)
+        head = f"{self.value:.0f} +- {self.value_error:.0f} rpm, elasticities ({lanes}; {self.status})"
+        each = zip(self.directions, self.elasticity, self.elasticity_error, strict=True)
         return "\n".join([head, *(f"  {name:<28} {value:+.3f} +- {error:.3f}" for name, value, error in each)])
 
     _repr_html_ = notebook_html
@@ -128,11 +102,7 @@ def lasting_edge(
         raise ArgumentError("within_rpm", said=f"must be positive, but {within_rpm} was given.")
     if horizon <= DISCARD + OBSERVED:
         raise ArgumentError("horizon", said=f"must be above {DISCARD + OBSERVED} revolutions, but {horizon} was given.")
-    values = parameters(model)
-    for name in names:
-        if name not in values or not float(values[name]):
-            raise ArgumentError("names", said=f"must hold parameters of the design that are not 0, but has {name!r}.")
-    base = np.array([float(values[name]) for name in names])
+    base = np.array(list(moved_parameters(model, names, "names").values()))
     rng = np.random.default_rng(seed)
     edge, window = float(rpm), float(within_rpm)
     elasticity = np.zeros(len(names))
@@ -146,7 +116,7 @@ def lasting_edge(
         speed, times = np.append(speed, np.repeat(at, each)), np.append(times, new)
         change = np.vstack([change, np.repeat(moved, each, axis=0)])
         found = _fitted(speed, change, times, (edge, window), end, tuple(names))
-        edge, elasticity = edge + float(np.clip(found.speed_rpm - edge, -window, window)), found.elasticity
+        edge, elasticity = edge + float(np.clip(found.value - edge, -window, window)), found.elasticity
         window = float(np.clip(REACH / max(abs(found.steepness), 1e-12), window / 2, 2 * window))
     assert found is not None
     return found
@@ -193,13 +163,13 @@ def _fitted(
     u = (rpm - edge) / window
 
     def solved(beta: Array) -> tuple[Array, Array]:
-        """Speed and elasticities, and the slope of the logarithm, where log rate = a + b u + c u^2 + ... is that of one
+        """Speed and its slopes, and the slope of the logarithm, where log rate = a + b u + c u^2 + ... is that of one
         escape in a horizon, at the root that is nearest to 0."""
         a, b = beta[0] + math.log(horizon), beta[1]
         c = beta[2] if beta.size > 2 + len(names) else 0.0
         at = -2 * a / (b + jnp.sign(b) * jnp.sqrt(b * b - 4 * a * c))
-        steep, speed = b + 2 * c * at, edge + window * at
-        return jnp.append(speed, -window * beta[-len(names) :] / steep / scale / speed), steep
+        steep = b + 2 * c * at
+        return jnp.append(edge + window * at, -window * beta[-len(names) :] / steep / scale), steep
 
     for powers in ([u, u**2], [u]):
         fit = hazard(times, horizon, np.column_stack([*powers, change / scale]), block=LIFE_BLOCK, t0=DISCARD)
@@ -207,26 +177,25 @@ def _fitted(
         (found, steep), (jacobian, _) = solved(beta), jax.jacfwd(solved)(beta)
         if abs(steep) > abs(fit.coefficients[1]) / 2:  # false for NaN; near the vertex of a square there is no edge
             break
-    speed, *elasticity = np.asarray(found).tolist()
     covariance = np.asarray(jacobian) @ fit.covariance @ np.asarray(jacobian).T
-    return LastingEdge(speed, names, np.array(elasticity), covariance, horizon, about, float(steep) / window, fit)
+    known = "edge", "rpm", float(found[0]), names, np.asarray(found[1:]), covariance
+    return LastingEdge(*known, horizon, about, float(steep) / window, fit)
 
 
 SolvedEdge = LastingEdge | Sensitivity
-"""An edge with its elasticities: by survival regression, or exact."""
+"""An edge with its slopes: by survival regression, or exact."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ZoneWidth:
     """Width of a zone, of lasting chaos or of synchronous loss, and its change with parameters.
 
-    Each edge has an error of its own; the gradient of an exact edge has none. A zone that is cut by the range is open:
-    it has no width, but its gradient is that of the other edge.
+    Each edge has an error of its own; the gradient of an exact edge has none. A zone that is cut by the range is open,
+    with None for the edge beyond it: it has no width, but its gradient is that of the other edge.
     """
 
     onset: SolvedEdge | None
     exit: SolvedEdge | None
-    """None where the zone goes on beyond the range."""
 
     @property
     def open(self) -> bool:
@@ -249,30 +218,23 @@ class ZoneWidth:
     @property
     def width_rpm(self) -> float | None:
         """Exit less onset; None for an open zone."""
-        return None if self.open else sum(speed for speed, *_ in self._ends())
+        return None if self.open else sum(sign * edge.value for sign, edge in self._ends())
 
     @property
     def standard_error_rpm(self) -> float | None:
         """Standard error of the width; for an exact edge its distance to that by half the steps counts."""
-        return None if self.open else math.hypot(*(error for _, error, _ in self._ends()))
+        return None if self.open else math.hypot(*(edge.value_error for _, edge in self._ends()))
 
     def change(self, *names: str) -> tuple[float, float]:
         """Change of the width when parameters grow together [rpm by their relative change], with its standard error;
         for an open zone that of its one edge."""
-        found = [(speed, *edge(names)) for speed, _, edge in self._ends()]
-        return sum(by * e for by, e, _ in found), math.hypot(*(by * error for by, _, error in found))
+        found = [(sign, *edge.change(*names)) for sign, edge in self._ends()]
+        return sum(sign * by for sign, by, _ in found), math.hypot(*(error for *_, error in found))
 
-    def _ends(self) -> list[tuple[float, float, Any]]:
-        """Speed, negative for the onset, its error, and the function that sums elasticities, of each edge."""
-        ends = [(-1.0, self.onset), (1.0, self.exit)]
-        exact = lambda edge: lambda names: (sum(edge.elasticity[n] for n in names), 0.0)
-        return [
-            (sign * edge.value_rpm, edge.error_rpm, exact(edge))
-            if isinstance(edge, Sensitivity)
-            else (sign * edge.speed_rpm, edge.standard_error_rpm, lambda names, edge=edge: edge.sum_of(*names))
-            for sign, edge in ends
-            if edge is not None
-        ]
+    def _ends(self) -> list[tuple[float, Slopes]]:
+        """The edges, each with the sign with which it counts."""
+        ends = (-1.0, self.onset), (1.0, self.exit)
+        return [(sign, Slopes.of(edge)) for sign, edge in ends if edge is not None]
 
 
 def zone_width(edges: Mapping[str, SolvedEdge], zone: int = 1) -> ZoneWidth:

@@ -1,8 +1,9 @@
-"""Slopes of statistics by parameters of the design, with standard errors, and tolerance budgets.
+"""Slopes of values by parameters of the design, with standard errors, and what tolerances make of them.
 
-Designs are scattered around the given one and run from the same initial states. They come in pairs that mirror each
-other: half the difference of a pair holds no curvature, and least squares over all pairs gives the slopes, with errors
-that assume no law of the scatter: J. G. MacKinnon and H. White, J. Econometrics 29 (1985) 305, HC3.
+Slopes of statistics come from designs that are scattered around the given one and run from the same initial states.
+They come in pairs that mirror each other: half the difference of a pair holds no curvature, and least squares over all
+pairs gives the slopes, with errors that assume no law of the scatter: J. G. MacKinnon and H. White, J. Econometrics 29
+(1985) 305, HC3.
 """
 
 import dataclasses
@@ -18,7 +19,7 @@ from .._parameters import parameters, replace
 from ..models import AbstractForcedSystem
 from ..orbits import Sensitivity
 from ..quantities import notebook_html
-from .statistics import STATISTICS, Runs, Statistic, statistics_of
+from .statistics import STATISTICS, Runs, Statistic, mean_and_error, statistics_of
 
 
 DIRECTIONS = (
@@ -35,26 +36,37 @@ DESIGNS, SPREAD = 64, 0.05
 
 
 @dataclasses.dataclass(frozen=True)
-class StatisticGradient:
-    """A statistic, and its change with relative changes of parameters."""
+class Slopes:
+    """A value, and its change with relative changes of parameters, or of some that change together."""
 
     name: str
     unit: str
     value: float
-    """Mean over all designs and initial states."""
-    value_error: float
-    """Its standard error, from the scatter of the pairs."""
-    drift: float
-    """Mean of the last block of the runs less that of the first: a value that drifts has not settled. NaN of one block.
-    """
-    drift_error: float
     directions: tuple[str, ...]
     by_relative_change: Float[np.ndarray, " n"]
     """Derivative of the value by the logarithm of each parameter [unit]."""
-    by_relative_change_error: Float[np.ndarray, " n"]
-    """Standard error of each derivative."""
-    explained: float
-    """Share of the scatter of the pairs that the slopes explain, 0 to 1."""
+    covariance: Float[np.ndarray, "1+n 1+n"]
+    """Covariance of the value and the derivatives [unit^2]; 0 where they are exact."""
+
+    @classmethod
+    def of(cls, edge: "Sensitivity | Slopes") -> "Slopes":
+        """The slopes of an exact edge; the distance of its speed [rpm] to that by half the steps is its error."""
+        if isinstance(edge, Slopes):
+            return edge
+        covariance = np.zeros((1 + len(edge.elasticity),) * 2)
+        covariance[0, 0] = edge.error_rpm**2
+        by = edge.value_rpm * np.array(list(edge.elasticity.values()))
+        return cls(edge.name, "rpm", edge.value_rpm, tuple(edge.elasticity), by, covariance)
+
+    @property
+    def value_error(self) -> float:
+        """Standard error of the value."""
+        return math.sqrt(self.covariance[0, 0])
+
+    @property
+    def by_relative_change_error(self) -> Float[np.ndarray, " n"]:
+        """Standard error of each derivative."""
+        return np.sqrt(np.diag(self.covariance)[1:])
 
     @property
     def elasticity(self) -> Float[np.ndarray, " n"]:
@@ -64,8 +76,43 @@ class StatisticGradient:
     @property
     def elasticity_error(self) -> Float[np.ndarray, " n"]:
         """Standard error of each elasticity."""
-        error = np.hypot(self.by_relative_change_error, self.elasticity * self.value_error)
-        return error / (abs(self.value) or math.nan)
+        return np.array([self.elasticity_of(name)[1] for name in self.directions])
+
+    def change(self, *names: str) -> tuple[float, float]:
+        """Derivative when parameters change together, such as gap and eccentricity at a fixed ratio, and its error.
+
+        **Raises:** `ValueError` for a parameter without a derivative.
+        """
+        chosen = self._chosen(names)
+        return float(chosen @ self.by_relative_change), _deviation(chosen, self.covariance[1:, 1:])
+
+    def elasticity_of(self, *names: str) -> tuple[float, float]:
+        """The same as a relative change of the value."""
+        (by, _), value = self.change(*names), self.value or math.nan
+        weight = np.append(-by / value, self._chosen(names)) / value
+        return by / value, _deviation(weight, self.covariance)
+
+    def _chosen(self, names: Sequence[str]) -> Float[np.ndarray, " n"]:
+        if unknown := [name for name in names if name not in self.directions]:
+            raise ArgumentError("names", said=f"must be among {', '.join(self.directions)}, but has '{unknown[0]}'.")
+        return np.array([float(n in names) for n in self.directions])
+
+
+def _deviation(weight: np.ndarray, covariance: np.ndarray) -> float:
+    """Standard deviation of a weighted sum."""
+    return float(np.sqrt(np.maximum(weight @ covariance @ weight, 0.0)))
+
+
+@dataclasses.dataclass(frozen=True)
+class StatisticGradient(Slopes):
+    """A statistic and its slopes; the value is the mean over all designs and initial states."""
+
+    drift: float
+    """Mean of the last block of the runs less that of the first: a value that drifts has not settled. NaN of one block.
+    """
+    drift_error: float
+    explained: float
+    """Share of the scatter of the pairs that the slopes explain, 0 to 1."""
 
     @property
     def settled(self) -> bool:
@@ -88,16 +135,9 @@ class MeanGradient:
     """Number of lanes that are `inaccurate`, which count."""
 
     def slope(self, statistic: str, parameter: str) -> tuple[float, float]:
-        """Derivative by one parameter that changes alone [unit of the statistic per SI unit], with its standard error.
-
-        **Raises:** `ValueError` for a parameter that does not change alone.
-        """
-        found = self.statistics[statistic]
-        alone = [name for name in found.directions if "+" not in name]
-        if parameter not in alone:
-            raise ArgumentError("parameter", said=f"must be one of {', '.join(alone)}, but '{parameter}' was given.")
-        i, value = found.directions.index(parameter), self.values[parameter]
-        return float(found.by_relative_change[i] / value), float(found.by_relative_change_error[i] / abs(value))
+        """Derivative by one parameter that changes alone [unit of the statistic per SI unit], with its error."""
+        slope, error = self.statistics[statistic].change(parameter)
+        return slope / self.values[parameter], error / abs(self.values[parameter])
 
     def __str__(self) -> str:
         lines = [f"Elasticities from {self.pairs} pairs of designs"]
@@ -129,8 +169,7 @@ def mean_gradient(
         slope is the mean slope over the box of designs.
     - `directions`: parameters that are not 0; those joined by `+` change by the same factor.
     - `designs`: number of designs, even; each parameter is moved up in half of them and down in the others, by half
-        of `spread` to all of it. More of them make errors smaller by their root, and so do more revolutions and a
-        larger spread.
+        of `spread` to all of it. Errors fall with the root of their number, and with a larger spread.
     - `spread`: relative half width of the box of designs, above 0 and at most 0.3. Finer structure is smoothed away;
         the slope is off by at most a sixth of spread^2 times the third derivative.
     - `seed`: seed of the designs.
@@ -142,7 +181,8 @@ def mean_gradient(
     counts that are impossible, too few designs for the directions; if too many of them fail.
     """
     require_at_least(0, seed=seed)
-    chosen, values = statistics_of(model, statistics), _values(model, directions)
+    chosen = statistics_of(model, statistics)
+    values = moved_parameters(model, [name for d in directions for name in d.split("+")], "directions")
     least = 2 * (len(directions) + 2)
     if designs % 2 or designs < least:
         said = f"must be an even number from {least} on, for so many directions, but {designs} was given."
@@ -165,18 +205,20 @@ def mean_gradient(
     return MeanGradient({name: fit(name) for name in chosen}, values, *about)
 
 
-def _values(model: AbstractForcedSystem, directions: Sequence[str]) -> dict[str, float]:
-    """Parameters in the directions. **Raises:** `ValueError` for none, and those that are unknown, 0 or named twice."""
+def moved_parameters(model: AbstractForcedSystem, names: Sequence[str], argument: str) -> dict[str, float]:
+    """Parameters [SI] that are moved by a part of their values.
+
+    **Raises:** `ValueError` for none, and those that are unknown, 0 or named twice.
+    """
     known = parameters(model)
-    names = [name for direction in directions for name in direction.split("+")]
     if not names:
-        raise ArgumentError("directions", said="must hold at least one parameter, but it is empty.")
+        raise ArgumentError(argument, said="must hold at least one parameter, but it is empty.")
     for name in names:
         if name not in known or not float(known[name]):
             said = f"must hold parameters of the design that are not 0, but has '{name}'."
-            raise ArgumentError("directions", said=said)
+            raise ArgumentError(argument, said=said)
         if names.count(name) > 1:
-            raise ArgumentError("directions", said=f"must name each parameter once, but has '{name}' twice.")
+            raise ArgumentError(argument, said=f"must name each parameter once, but has '{name}' twice.")
     return {name: float(known[name]) for name in names}
 
 
@@ -203,32 +245,30 @@ def gradient_of_pairs(
     of the runs.
     """
     both = blocks.mean(axis=-1)
-    half, middle = (both[0] - both[1]) / 2, both.mean(axis=0)
+    half = (both[0] - both[1]) / 2
     drift = (blocks[..., -1] - blocks[..., 0]).mean(axis=0) if blocks.shape[-1] > 1 else np.full(len(half), np.nan)
-    inverse = np.linalg.inv(moved.T @ moved)
-    slopes = inverse @ moved.T @ half
+    bread = np.linalg.inv(moved.T @ moved) @ moved.T
+    slopes = bread @ half
     left = half - moved @ slopes
-    bread = inverse @ moved.T
-    weight = left / (1 - np.einsum("ij,ji->i", moved, bread))  # HC3
-    slope_error = np.sqrt((bread**2) @ weight**2)
+    weighted = bread * (left / (1 - np.einsum("ij,ji->i", moved, bread)))  # HC3
+    value, error = mean_and_error(both.mean(axis=0))
+    covariance = np.zeros((1 + slopes.size,) * 2)
+    covariance[0, 0], covariance[1:, 1:] = error**2, weighted @ weighted.T
     total = float(np.sum(half * half))
-    error = lambda x: float(np.std(x, ddof=1) / math.sqrt(len(half)))
-    means = float(middle.mean()), error(middle), float(drift.mean()), error(drift)
     explained = 1 - float(np.sum(left * left)) / total if total > 0 else math.nan
-    return StatisticGradient(name, unit, *means, directions, slopes, slope_error, explained)
+    return StatisticGradient(name, unit, value, directions, slopes, covariance, *mean_and_error(drift), explained)
 
 
 @dataclasses.dataclass(frozen=True)
 class ToleranceBudget:
-    """Scatter of an edge or a statistic that the scatter of parameters causes, to first order."""
+    """Scatter of an edge or a statistic that the scatter of parameters causes, to first order: standard `deviation` due
+    to each parameter alone, or to several that change together, and its standard `error` [unit]."""
 
     name: str
     unit: str
     value: float
     deviation: dict[str, float]
-    """Standard deviation due to each parameter, or several that change together, alone [unit]."""
     error: dict[str, float]
-    """Standard error of each; 0 of an exact edge."""
 
     @property
     def total(self) -> float:
@@ -244,12 +284,11 @@ class ToleranceBudget:
         order = sorted(self.deviation.items(), key=lambda item: -item[1])
         total = self.total or 1.0  # without any scatter, nothing is a part of it
         rows = [f"  {n:<24} +-{d:.3g} {self.unit}, {100 * (d / total) ** 2:.0f} % of the variance" for n, d in order]
-        return "\n".join(
-            [f"{self.name} {self.value:.6g} {self.unit}: +-{1.96 * self.total:.3g} {self.unit} (95 %)", *rows]
-        )
+        head = f"{self.name} {self.value:.6g} {self.unit}: +-{1.96 * self.total:.3g} {self.unit} (95 %)"
+        return "\n".join([head, *rows])
 
 
-def tolerance_budget(of: Sensitivity | StatisticGradient, deviation: Mapping[str, float]) -> ToleranceBudget:
+def tolerance_budget(of: Sensitivity | Slopes, deviation: Mapping[str, float]) -> ToleranceBudget:
     """Scatter of an edge from its exact derivatives, or of a statistic from its slopes.
 
     **Arguments:** edge or statistic; standard deviation of each parameter relative to its value (a tolerance of +-t,
@@ -257,16 +296,11 @@ def tolerance_budget(of: Sensitivity | StatisticGradient, deviation: Mapping[str
 
     **Raises:** `ValueError` for a parameter without a derivative, or a negative deviation.
     """
-    if isinstance(of, StatisticGradient):
-        value, unit, each = of.value, of.unit, zip(of.by_relative_change, of.by_relative_change_error, strict=True)
-        slopes = dict(zip(of.directions, each, strict=True))
-    else:
-        value, unit = of.value_rpm, "rpm"
-        slopes = {name: (elasticity * value, 0.0) for name, elasticity in of.elasticity.items()}
+    slopes = Slopes.of(of)
     for name, d in deviation.items():
-        if name not in slopes:
-            raise InputError(f"Tolerance of `{name}` must be of one of {', '.join(slopes)}.")
+        if name not in slopes.directions:
+            raise InputError(f"Tolerance of `{name}` must be of one of {', '.join(slopes.directions)}.")
         if not d >= 0:
             raise InputError(f"Tolerance of `{name}` must not be negative, but {d} was given.")
-    by, error = ({n: float(abs(slopes[n][k]) * d) for n, d in deviation.items()} for k in (0, 1))
-    return ToleranceBudget(of.name, unit, value, by, error)
+    by, error = ({n: abs(slopes.change(n)[k]) * d for n, d in deviation.items()} for k in (0, 1))
+    return ToleranceBudget(slopes.name, slopes.unit, slopes.value, by, error)
