@@ -151,8 +151,7 @@ def independent(range_, quantity, value):
         end, sign = (range_.operating[0], -1) if quantity == "lower margin" else (range_.operating[1], 1)
         return lambda m: 100 * sign * (edge_speed(m, edge.kind, speed, edge.state / scale) / end - 1)
     through = range_.through(range_.space.place)
-    rise = np.argsort(through.value)
-    z = np.array([np.interp(speed, through.value[rise], c) for c in through.state[rise].T]) / scale
+    z = through.state(speed) / scale
     if quantity == "multiplier":
         return lambda m: np.max(np.abs(np.linalg.eigvals(orbit(m, speed, z)[1])))
     return lambda m: readings(m, speed, z)[quantity]
@@ -269,7 +268,7 @@ REFUSED = [
     (dict(vary={"z": (0.0, 1.0)}), "`z` must be a parameter of the design: x, y, d, k, s, r"),
     (dict(vary={"x": (1.0, 1.0)}), "Bounds of `x` must ascend, but 1.0 and 1.0 were given"),
     (dict(search="newton"), "`search` must be one of slsqp, augmented, but 'newton' was given"),
-    (dict(objective="noise"), "`objective` must be cost or width, but 'noise' was given"),
+    (dict(objective="noise"), "`objective` must be one of cost, width, but 'noise' was given"),
     (dict(cost={"z": Price(1.0, 1.0)}), "`cost` must name parameters of the design, but has 'z'"),
     (dict(tolerance={"x": Tolerance.balanced(2.5, 100.0)}), "`tolerance` gives the made range of x itself"),
     (dict(tolerance={"x": Tolerance(0.1, -0.1)}), "`tolerance` of x must have a lower end below its upper end"),

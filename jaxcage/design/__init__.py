@@ -10,7 +10,7 @@
 | `statistics`    | chaotic speeds, quantities, loads of designs, read off one sweep; designs compared |
 | `loads`         | loads of the guiding land, size and whirl of the motion                            |
 | `slopes`        | slopes of statistics by paired designs; tolerance budgets                          |
-| `lasting_edges` | edges of lasting chaos with slopes by survival regression; widths of zones         |
+| `survival_edges`| edges of lasting chaos with slopes by survival regression; widths of zones         |
 | `variance`      | Sobol indices                                                                      |
 | `surrogate`     | search for a better design by a Gaussian process                                   |
 | `unknowns`      | chances of chaos of a cage known within ranges; ranges narrowed by measurements    |
@@ -19,14 +19,6 @@
 from .._arguments import check_layer
 from .check import Checked as Checked, check_design as check_design
 from .design_space import DesignSpace as DesignSpace, Value as Value
-from .lasting_edges import (
-    LastingEdge as LastingEdge,
-    SolvedEdge as SolvedEdge,
-    ZoneWidth as ZoneWidth,
-    lasting_edge as lasting_edge,
-    lasting_edges as lasting_edges,
-    zone_width as zone_width,
-)
 from .loads import LAND_LOADS as LAND_LOADS, land_loads as land_loads, motions as motions
 from .operating import OperatingRange as OperatingRange, UnstableWidth as UnstableWidth
 from .requirements import (
@@ -66,6 +58,14 @@ from .statistics import (
     statistic as statistic,
 )
 from .surrogate import Optimum as Optimum, SurrogateSearch as SurrogateSearch, surrogate_search as surrogate_search
+from .survival_edges import (
+    LastingEdge as LastingEdge,
+    SolvedEdge as SolvedEdge,
+    ZoneWidth as ZoneWidth,
+    lasting_edge as lasting_edge,
+    lasting_edges as lasting_edges,
+    zone_width as zone_width,
+)
 from .unknowns import (
     REVOLUTIONS as REVOLUTIONS,
     Clue as Clue,

@@ -20,7 +20,6 @@ from scipy.optimize import minimize_scalar
 from .._errors import InputError
 from .._pytrees import compiled
 from ..orbits import (
-    Branch,
     Followed,
     Orbit,
     Point,
@@ -56,7 +55,7 @@ RPM = 30 / np.pi
 READ = "land force", "drag", "film"
 
 
-# --- readings along an orbit ---------------------------------------------------------------------------------------
+# --- orbits through a range -----------------------------------------------------------------------------------------
 
 
 def _readings(system: Any, speed: Array, state: Array, method: AbstractMethod) -> Float[Array, "3"]:
@@ -94,11 +93,88 @@ def _read_moved(
     return jax.jacfwd(at)(place)
 
 
+class Through(NamedTuple):
+    """Orbits through a range of speed at one place of the design space, by ascending speed: speeds [rad/s], states [SI]
+    and sizes of the largest multipliers."""
+
+    space: DesignSpace
+    place: Float[np.ndarray, " n"]
+    speeds: Float[np.ndarray, " orbits"]
+    states: Float[np.ndarray, "orbits dim"]
+    sizes: Float[np.ndarray, " orbits"]
+
+    @classmethod
+    def of(cls, space: DesignSpace, place: Float[np.ndarray, " n"], orbit: Orbit, low: float, high: float) -> "Through":
+        """The orbits between two speeds by continuation of one of them, as far as the speed rises or falls throughout:
+        past a fold there are other orbits at the same speeds."""
+        found = branch(space.model(place), orbit, lower=low, upper=high)
+        speed, state = float(orbit.speed), np.asarray(orbit.state)
+        away = np.abs(found.speed / speed - 1) + np.linalg.norm(found.state - state, axis=1) / np.linalg.norm(state)
+        rises = np.diff(found.speed) > 0
+        here = min(int(np.argmin(away)), rises.size - 1)
+        turns = np.flatnonzero(rises != rises[here])
+        first = int(np.max(turns[turns < here], initial=-1)) + 1
+        last = int(np.min(turns[turns > here], initial=rises.size)) + 1
+        some = first + np.argsort(found.value[first:last])
+        sizes = np.abs(found.multipliers[some]).max(axis=1)
+        return cls(space, place, found.value[some], found.state[some], sizes)
+
+    def state(self, speed: float) -> Float[np.ndarray, " dim"]:
+        """State near the orbit at a speed."""
+        return np.array([np.interp(speed, self.speeds, c) for c in self.states.T])
+
+    def orbit(self, speed: float) -> Orbit:
+        """The orbit at a speed."""
+        return periodic_orbit(self.space.model(self.place), speed, guess=self.state(speed))
+
+    def size(self, orbit: Orbit, name: str, speed: float | None = None) -> float:
+        """How bad an orbit is, or that of another speed, by the method of this one with a step at least from one phase
+        to the next."""
+        if speed is None and not bool(orbit.converged):
+            return -np.inf
+        if name == "multiplier":
+            return float(np.abs(orbit.multipliers[0]))
+        at = (orbit.speed, orbit.state) if speed is None else (speed, self.state(speed))
+        place, *at = jnp.asarray(self.place), *(jnp.asarray(x, dtype=float) for x in at)
+        return float(_read(self.space, place, *at, _reader(orbit))[READ.index(name)])
+
+    def value(self, orbit: Orbit, name: str) -> Value:
+        """A value of an orbit with its derivatives."""
+        moves, rpm = orbit_slopes(self.space, self.place, orbit), float(orbit.speed) * RPM
+        if name == "multiplier":
+            return Value(moves.multiplier, moves.multiplier_slope, rpm)
+        at = jnp.asarray(self.place), orbit.speed, orbit.state, jnp.asarray(moves.state_slope)
+        slope = np.asarray(_read_moved(self.space, *at, _reader(orbit))[READ.index(name)])
+        sign = -1.0 if name == "film" else 1.0
+        return Value(sign * self.size(orbit, name), sign * slope, rpm)
+
+    def largest(self, name: str, low: float, high: float) -> Orbit:
+        """The orbit between two speeds at which a quantity is largest, its speed to `WORST_AT`."""
+        minus = lambda speed: -float(np.nan_to_num(self.size(self.orbit(float(speed)), name), neginf=0.0))
+        found = minimize_scalar(minus, bounds=(low, high), method="bounded", options={"xatol": WORST_AT * high})
+        return self.orbit(float(found.x))
+
+    def worst(self, name: str, low: float, high: float) -> Value:
+        """A value where it is worst between two speeds."""
+        inner = (self.speeds > low) & (self.speeds < high)
+        ends = [self.orbit(low), self.orbit(high)]
+        by_branch = self.sizes[inner]
+        if name != "multiplier":
+            by_branch = [self.size(ends[0], name, speed) for speed in self.speeds[inner].tolist()]
+        first, last = (self.size(orbit, name) for orbit in ends)
+        speeds, sizes = np.array([low, *self.speeds[inner], high]), np.array([first, *by_branch, last])
+        near_top = [k for k in _maxima(sizes) if sizes[k] >= sizes.max() - RIVAL * np.ptp(sizes)]
+        orbits = [*ends, *(self.largest(name, speeds[k - 1], speeds[k + 1]) for k in near_top)]
+        return self.value(max(orbits, key=lambda orbit: self.size(orbit, name)), name)
+
+
+def _maxima(sizes: np.ndarray) -> list[int]:
+    """Places of the local maxima within a row of numbers."""
+    return [k for k in range(1, sizes.size - 1) if sizes[k - 1] < sizes[k] >= sizes[k + 1]]
+
+
 def _reader(orbit: Orbit) -> AbstractMethod:
-    """The method by which an orbit is read: its own, with a step at least from one phase to the next."""
-    method = orbit.method
-    if not isinstance(method, FixedSteps):
-        return method
+    method: Any = orbit.method
     return FixedSteps(method.solver, jnp.asarray(PARTS * -(-int(orbit.steps) // PARTS)))
 
 
@@ -122,7 +198,6 @@ class _AroundEdges:
     operating: tuple[float, float]
     margin: float = 0.0
     """Per cent of speed beyond both ends over which orbits are followed as well."""
-    method: AbstractMethod | None = None
 
     def __post_init__(self):
         low, high = self.operating
@@ -140,7 +215,7 @@ class _AroundEdges:
     def _followed(self, near: _Anchor, place: np.ndarray) -> dict[str, Followed]:
         """What became of the edges that an anchor has, at a place."""
         known = {name: point for name, point in near.edges.items() if point is not None}
-        return follow_all(self.space.model(near.place), known, self.space.model(place), self.limits, self.method)
+        return follow_all(self.space.model(near.place), known, self.space.model(place), self.limits)
 
     def _keep(self, near: _Anchor, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> None:
         """Follow edges from this place, too."""
@@ -157,7 +232,7 @@ class UnstableWidth(_AroundEdges):
     """
 
     def _first(self) -> _Anchor:
-        found = loss_zones(synchronous_orbits(self.space.system, *self.operating, method=self.method))
+        found = loss_zones(synchronous_orbits(self.space.system, *self.operating))
         if not found.edges:
             raise InputError("The range of speed must have an edge of an unstable range within it, but has none.")
         return _Anchor(self.space.place, found.edges)
@@ -197,8 +272,8 @@ class OperatingRange(_AroundEdges):
     def _first(self) -> _Anchor:
         (low, high), part = self.operating, self.margin / 100
         self.wider = (1 - part) * low, (1 + part) * high
-        self._through: dict[bytes, Branch | None] = {}
-        found = stable_range(self.space.system, self.operating, self.limits, method=self.method)
+        self._through: dict[bytes, Through | None] = {}
+        found = stable_range(self.space.system, self.operating, self.limits)
         if found is None:
             raise InputError(
                 f"The cage must have a stable orbit somewhere in its operating range, {low * RPM:.0f} to "
@@ -231,8 +306,7 @@ class OperatingRange(_AroundEdges):
         moved = self._followed(near, place)
         found = dict.fromkeys(near.edges) | {name: f.edge for name, f in moved.items()}
         if all(f.edge is not None and f.edge.bounds for f in moved.values()) and self._stable_ends(place, found):
-            through = self.through(place)
-            sizes = np.zeros(0) if through is None else self._between(through, found)[1]
+            sizes = self._between(place, found)[1]
             if np.all(sizes < 1):
                 self._keep(near, place, found)
                 return found
@@ -245,7 +319,7 @@ class OperatingRange(_AroundEdges):
     ) -> dict[str, Sensitivity | None] | str:
         """The edges that bound the stable range now, by a search from its orbit."""
         guess = (near.state * self._scale(place, near.speed), near.speed)
-        search = partial(stable_range, self.space.model(place), self.operating, self.limits, method=self.method)
+        search = partial(stable_range, self.space.model(place), self.operating, self.limits)
         found = search([guess]) or search()
         if found is None:
             return "no stable orbit in the operating range"
@@ -305,7 +379,7 @@ class OperatingRange(_AroundEdges):
         while part > 0.05:
             there = near.place + min(done + part, 1.0) * (place - near.place)
             scale = self._scale(there, near.speed)
-            orbit = periodic_orbit(self.space.model(there), near.speed, guess=state * scale, method=self.method)
+            orbit = periodic_orbit(self.space.model(there), near.speed, guess=state * scale)
             if bool(orbit.converged) and np.max(np.abs(np.asarray(orbit.state) / scale - state)) < FAR:
                 done, state = min(done + part, 1.0), np.asarray(orbit.state) / scale
                 if done == 1:
@@ -314,27 +388,24 @@ class OperatingRange(_AroundEdges):
                 part /= 2
         return None
 
-    def through(self, place: Float[np.ndarray, " n"]) -> Branch | None:
-        """The orbits through the operating range and the margins beside it, by continuation; None if they are lost."""
+    def through(self, place: Float[np.ndarray, " n"]) -> Through | None:
+        """The orbits through the operating range and the margins beside it; None if they are lost."""
         key = np.asarray(place).tobytes()
         if key not in self._through:
             orbit, (low, high) = self._orbit(place), self.wider
-            found = None
-            if orbit is not None and low < float(orbit.speed) < high:
-                found = branch(self.space.model(place), orbit, lower=low, upper=high, method=self.method)
-                found = None if found is None else _between_folds(found, orbit)
-            self._through[key] = found
+            inside = orbit is not None and low < float(orbit.speed) < high
+            self._through[key] = Through.of(self.space, place, orbit, low, high) if orbit and inside else None
         return self._through[key]
 
-    def _between(self, through: Branch, edges: Mapping[str, Sensitivity | None]) -> tuple[np.ndarray, np.ndarray]:
-        """Speeds of a branch between the edges, ascending, and the sizes of the largest multipliers there."""
+    def _between(self, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> tuple[np.ndarray, np.ndarray]:
+        """Speeds of the orbits between the edges, ascending, and the sizes of their largest multipliers."""
+        if (through := self.through(place)) is None:
+            return np.zeros(0), np.zeros(0)
         (low, high), lower, upper = self.wider, edges["lower"], edges["upper"]
         low = low if lower is None else max(low, lower.value_rpm / RPM)
         high = high if upper is None else min(high, upper.value_rpm / RPM)
-        order = np.argsort(through.value)
-        speeds, sizes = through.value[order], np.abs(through.multipliers[order]).max(axis=1)
-        inside = (speeds > low * (1 + BESIDE)) & (speeds < high * (1 - BESIDE))
-        return speeds[inside], sizes[inside]
+        inside = (through.speeds > low * (1 + BESIDE)) & (through.speeds < high * (1 - BESIDE))
+        return through.speeds[inside], through.sizes[inside]
 
     def _stable_ends(self, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> bool:
         """Whether the orbits at the ends of the margins are stable, where the edges lie beyond them."""
@@ -342,97 +413,22 @@ class OperatingRange(_AroundEdges):
         for name, end, sign in (("lower", self.wider[0], 1.0), ("upper", self.wider[1], -1.0)):
             edge = edges[name]
             if through is not None and (edge is None or sign * (end - edge.value_rpm / RPM) > BESIDE * end):
-                orbit = self._orbit_at(through, place, end)
-                if bool(orbit.converged) and float(np.abs(orbit.multipliers[0])) >= 1:
+                if through.size(through.orbit(end), "multiplier") >= 1:
                     return False
         return True
 
     def peak(self, place: Float[np.ndarray, " n"], edges: Mapping[str, Sensitivity | None]) -> Value:
         """The largest multiplier at a maximum between the edges: where it passes 1, a new unstable range is born."""
-        if (through := self.through(place)) is not None:
-            speeds, sizes = self._between(through, edges)
-            if inner := [k for k in _maxima(sizes) if sizes[k] > PEAKING]:
-                k = max(inner, key=lambda k: sizes[k])
-                orbit = self._largest(through, place, "multiplier", speeds[k - 1], speeds[k + 1])
-                return self._value(place, orbit, "multiplier")
-        return Value(0.0, np.zeros(place.size))
+        through, (speeds, sizes) = self.through(place), self._between(place, edges)
+        inner = [k for k in _maxima(sizes) if sizes[k] > PEAKING]
+        if through is None or not inner:
+            return Value(0.0, np.zeros(place.size))
+        k = max(inner, key=lambda k: sizes[k])
+        return through.value(through.largest("multiplier", speeds[k - 1], speeds[k + 1]), "multiplier")
 
     def worst(self, place: Float[np.ndarray, " n"], names: tuple[str, ...]) -> dict[str, Value] | str:
         """The worst over the operating range of some of `multiplier`, `film`, `land force`, `drag`; or why there is
         none. `film` is the least distance of cage and land [m], negative where they touch."""
-        if not names:
-            return {}
-        if (through := self.through(place)) is None:
-            return "the orbits of the operating range are lost"
-        return {name: self._value(place, self._worst_orbit(through, place, name), name) for name in names}
-
-    def _value(self, place: np.ndarray, orbit: Orbit, name: str) -> Value:
-        """A value of an orbit with its derivatives."""
-        moves, rpm = orbit_slopes(self.space, place, orbit), float(orbit.speed) * RPM
-        if name == "multiplier":
-            return Value(moves.multiplier, moves.multiplier_slope, rpm)
-        at, which = (jnp.asarray(place), orbit.speed, orbit.state), READ.index(name)
-        slope = np.asarray(_read_moved(self.space, *at, jnp.asarray(moves.state_slope), _reader(orbit))[which])
-        sign = -1.0 if name == "film" else 1.0
-        return Value(sign * self._size(place, orbit, name), sign * slope, rpm)
-
-    def _size(self, place: np.ndarray, orbit: Orbit, name: str, at: tuple[Any, Any] | None = None) -> float:
-        """How bad an orbit is, or that of another speed and state, by the method of this one."""
-        if at is None and not bool(orbit.converged):
-            return -np.inf
-        if name == "multiplier":
-            return float(np.abs(orbit.multipliers[0]))
-        speed, state = at or (orbit.speed, orbit.state)
-        given = jnp.asarray(place), jnp.asarray(speed, dtype=float), jnp.asarray(state)
-        return float(_read(self.space, *given, _reader(orbit))[READ.index(name)])
-
-    def _orbit_at(self, through: Branch, place: np.ndarray, speed: float) -> Orbit:
-        return periodic_orbit(self.space.model(place), speed, guess=_state_at(through, speed), method=self.method)
-
-    def _largest(self, through: Branch, place: np.ndarray, name: str, low: float, high: float) -> Orbit:
-        """The orbit between two speeds at which a quantity is largest, its speed to `WORST_AT`."""
-        size = lambda speed: self._size(place, self._orbit_at(through, place, float(speed)), name)
-        minus = lambda speed: -float(np.nan_to_num(size(speed), neginf=0.0))
-        options = {"xatol": WORST_AT * high}
-        found = minimize_scalar(minus, bounds=(low, high), method="bounded", options=options)
-        return self._orbit_at(through, place, float(found.x))
-
-    def _worst_orbit(self, through: Branch, place: np.ndarray, name: str) -> Orbit:
-        """The orbit within the operating range at which a quantity is worst."""
-        order, (low, high) = np.argsort(through.value), self.operating
-        order = order[(through.value[order] > low) & (through.value[order] < high)]
-        ends = [self._orbit_at(through, place, speed) for speed in (low, high)]
-        if name == "multiplier":
-            middle = np.abs(through.multipliers[order]).max(axis=1)
-        else:
-            each = [(s, _state_at(through, s)) for s in through.value[order]]
-            middle = np.array([self._size(place, ends[0], name, at) for at in each])
-        first, last = (self._size(place, orbit, name) for orbit in ends)
-        speeds, sizes = np.array([low, *through.value[order], high]), np.array([first, *middle, last])
-        near_top = [k for k in _maxima(sizes) if sizes[k] >= sizes.max() - RIVAL * np.ptp(sizes)]
-        inner = [self._largest(through, place, name, speeds[k - 1], speeds[k + 1]) for k in near_top]
-        return max([*ends, *inner], key=lambda orbit: self._size(place, orbit, name))
-
-
-def _maxima(sizes: np.ndarray) -> list[int]:
-    """Places of the local maxima within a row of numbers."""
-    return [k for k in range(1, sizes.size - 1) if sizes[k - 1] < sizes[k] >= sizes[k + 1]]
-
-
-def _between_folds(found: Branch, orbit: Orbit) -> Branch:
-    """The part of a branch about one of its orbits in which the speed rises or falls throughout: past a fold there are
-    other orbits at the same speeds."""
-    size = float(orbit.speed), np.asarray(orbit.state)
-    away = np.abs(found.speed / size[0] - 1) + np.linalg.norm(found.state - size[1], axis=1) / np.linalg.norm(size[1])
-    rises = np.diff(found.speed) > 0
-    here = min(int(np.argmin(away)), rises.size - 1)
-    turns = np.flatnonzero(rises != rises[here])
-    first = int(np.max(turns[turns < here], initial=-1)) + 1
-    last = int(np.min(turns[turns > here], initial=rises.size)) + 1
-    arrays = ("value", "speed", "state", "multipliers", "stable", "steps", "error")
-    return dataclasses.replace(found, **{name: getattr(found, name)[first:last] for name in arrays})
-
-
-def _state_at(through: Branch, speed: float) -> np.ndarray:
-    order = np.argsort(through.value)
-    return np.array([np.interp(speed, through.value[order], c) for c in through.state[order].T])
+        if names and (through := self.through(place)) is not None:
+            return {name: through.worst(name, *self.operating) for name in names}
+        return "the orbits of the operating range are lost" if names else {}

@@ -8,7 +8,7 @@ case (the envelope theorem).
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -21,7 +21,6 @@ from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
 from ..lanes import sobol
 from ..models import AbstractForcedSystem
-from ..solve import AbstractMethod
 from .check import Checked, check_design
 from .design_space import DesignSpace, Value, function_value
 from .operating import KEPT, OperatingRange, UnstableWidth
@@ -154,28 +153,27 @@ class Problem:
     def compute(self, place: np.ndarray) -> Trial:
         """The trial at a place."""
         values = self._values(place)
-        lost = isinstance(values, str)
-        cost, slope = (np.inf, np.zeros(place.size)) if lost and self.cost is None else self.priced_at(place, values)
-        worst = values if lost else self.worst(place, values, self.tolerance)
-        if lost or isinstance(worst, str):
-            why = worst if lost else f"within the tolerances: {worst}"
+        worst = values if isinstance(values, str) else self.worst(place, values, self.tolerance)
+        cost, slope = self._costs(place, values)
+        if isinstance(values, str) or isinstance(worst, str):
+            why = str(worst) if worst is values else f"within the tolerances: {worst}"
             m, n = len(self.wanted), place.size
-            return Trial(place, cost, slope, np.full(m, -LOST), np.zeros((m, n)), {}, {}, str(why))
+            return Trial(place, cost, slope, np.full(m, -LOST), np.zeros((m, n)), {}, {}, why)
         pairs = [r.slack(worst[r.name]) for r in self.wanted]
         slack, by = np.array([s for s, _ in pairs]), np.array([d for _, d in pairs]).reshape(-1, place.size)
         return Trial(place, cost, slope, slack, by, values, worst)
 
-    def priced_at(self, place: np.ndarray, values: Any = None) -> tuple[float, np.ndarray]:
-        """The cost at a place and its derivatives."""
+    def _costs(self, place: np.ndarray, values: dict[str, Value] | str) -> tuple[float, np.ndarray]:
+        """The cost of a design with its values, and its derivatives by the place."""
         if self.cost is None:
-            return values["width"].value, values["width"].slope
+            return (np.inf, np.zeros(place.size)) if isinstance(values, str) else values["width"][:2]
         value, slope = function_value(self.cost, self.space, jnp.asarray(place))
         return float(value), np.asarray(slope)
 
     def foreseen(self, trial: Trial, place: np.ndarray) -> tuple[float, np.ndarray]:
         """The cost near a trial and its derivatives, to first order where it is dear to compute."""
         if self.cost is not None:
-            return self.priced_at(place)
+            return self._costs(place, {})
         return trial.cost + float(trial.cost_slope @ (place - trial.place)), trial.cost_slope
 
     def priced(self, trial: Trial, size: float) -> float:
@@ -222,13 +220,12 @@ def design_for(
     keep: Requirements = Requirements(),
     cost: Cost | None = None,
     *,
-    objective: str = "cost",
+    objective: Literal["cost", "width"] = "cost",
     tolerance: Mapping[str, Tolerance] | None = None,
-    search: str = "slsqp",
+    search: Literal["slsqp", "augmented"] = "slsqp",
     starts: int = 1,
     seed: int = 0,
     check: int = 16,
-    method: AbstractMethod | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Design:
     """Find the cheapest design that is calm over an operating range, with margins, for every bearing within tolerances.
@@ -255,14 +252,10 @@ def design_for(
     require_x64()
     require_at_least(1, starts=starts)
     require_at_least(0, check=check)
-    if objective not in ("cost", "width"):
-        raise ArgumentError("objective", said=f"must be cost or width, but '{objective}' was given.")
-    if search not in SEARCHES:
-        raise ArgumentError("search", said=f"must be one of {', '.join(SEARCHES)}, but '{search}' was given.")
     low, high = operating
     if not 0 < low < high < float("inf"):
         raise ArgumentError("operating", said=f"must be two positive speeds, ascending, but are {low:g} and {high:g}.")
-    tolerance = dict(tolerance or {})
+    tolerance = tolerance or {}
     space = DesignSpace.of(model, widened(model, vary, tolerance))
     free = np.array([name in vary for name in space.names])
     say = progress or (lambda what, done, of: None)
@@ -271,18 +264,17 @@ def design_for(
         if others := [n for n in ("decay", "film", "land_force", "drag") if getattr(keep, n) is not None]:
             raise ArgumentError("keep", said=f"must have no {others[0]} where the width is the objective.")
         wanted = [r for r in listed(keep, model) if r.of == "balance"]
-        problem = Problem(UnstableWidth(space, operating, method=method), wanted, None, free, tolerance)
+        problem = Problem(UnstableWidth(space, operating), wanted, None, free, tolerance)
     else:
-        range_ = OperatingRange(space, operating, keep.margin, method)
+        range_ = OperatingRange(space, operating, keep.margin)
         problem = Problem(range_, listed(keep, model), cost_function(cost, model), free, tolerance)
     own = np.where(free, np.clip(space.place, 0, 1), space.place)
-    count = int(free.sum())
-    places = [own] + [problem.whole(x, own) for x in sobol(count, max(starts, 2), seed)[: starts - 1]]
-    found = [
-        SEARCHES[search](problem, begin, lambda done, i=i: say(f"search {i + 1}", done, ITERATIONS))
-        for i, begin in enumerate(places)
-    ]
-    return _described(problem, min(found, key=lambda place: _merit(problem, place)), tolerance, check, say)
+    places = [own, *(problem.whole(x, own) for x in sobol(int(free.sum()), max(starts, 2), seed)[: starts - 1])]
+    told = lambda i: lambda done: say(f"search {i}", done, ITERATIONS)
+    found = [SEARCHES[search](problem, begin, told(i)) for i, begin in enumerate(places, start=1)]
+    best = min(found, key=lambda place: _merit(problem, place))
+    checked = check_design(space.model(best), operating, check, say) if check and not problem.at(best).lost else None
+    return _described(problem, best, checked)
 
 
 def _merit(problem: Problem, place: np.ndarray) -> tuple[float, float]:
@@ -363,15 +355,14 @@ def _step(
 
 def _augmented(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
     """The same by optax's Adam on an augmented Lagrangian, whose multipliers are renewed eight times."""
-    place, weight, rounds, steps = begin.copy(), 10.0, 8, 12
-    multiplier = np.zeros(len(problem.wanted))
-    size = max(abs(problem.at(begin).cost), 1e-12)
+    place, weight, rounds, steps = begin, 10.0, 8, 12
+    multiplier, size = np.zeros(len(problem.wanted)), max(abs(problem.at(begin).cost), 1e-12)
     for turn in range(rounds):
         adam = optax.adam(0.03 / (1 + turn))
         state = adam.init(jnp.asarray(place[problem.free]))
         for _ in range(steps):
             trial = problem.at(place)
-            broken = np.maximum(0.0, multiplier - weight * problem.at(place).slack)
+            broken = np.maximum(0.0, multiplier - weight * trial.slack)
             slope = (trial.cost_slope / size - broken @ trial.slack_slope)[problem.free]
             with jax.numpy_dtype_promotion("standard"):  # Adam's bias correction is a power of an integer
                 move, state = adam.update(jnp.asarray(slope), state)
@@ -396,12 +387,9 @@ SEARCHES: dict[str, Any] = {"slsqp": _programme, "augmented": _augmented}
 
 def _weights(slopes: np.ndarray, x: np.ndarray, objective: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lagrange multipliers of requirements with these slopes, and of the bounds, for a gradient of the objective."""
-    unit = np.eye(x.size)
-    low, high = np.flatnonzero(x < AT_BOUND), np.flatnonzero(x > 1 - AT_BOUND)
-    found, _ = nnls(np.column_stack([*slopes, *unit[low], *-unit[high], np.zeros(x.size)]), objective)
-    of_bound = np.zeros(x.size)
-    of_bound[np.concatenate([low, high])] = found[len(slopes) : -1]
-    return found[: len(slopes)], of_bound
+    low, high = x < AT_BOUND, x > 1 - AT_BOUND
+    found, _ = nnls(np.column_stack([*slopes, *np.diag(1.0 * low - high)]), objective)
+    return found[: len(slopes)], found[len(slopes) :]
 
 
 def _conflict(problem: Problem, trial: Trial, names: list[str]) -> tuple[str, ...]:
@@ -416,10 +404,10 @@ def _conflict(problem: Problem, trial: Trial, names: list[str]) -> tuple[str, ..
     return (*against, *(f"the bound of {n}" for n, w in zip(names, bounds, strict=False) if w > 1e-3 * size))
 
 
-def _budget(problem: Problem, trial: Trial, tolerance: Mapping[str, Tolerance]) -> list[Budget]:
+def _budget(problem: Problem, trial: Trial) -> list[Budget]:
     """How wide each tolerance may be while the others stay: foreseen at first order, then solved for at the corners,
     and less wide until all requirements hold there."""
-    rows = []
+    rows, tolerance = [], problem.tolerance
     for foreseen in budget_of(problem.space, tolerance, trial.slack_slope, trial.slack, problem.wanted):
         most, found = min(foreseen.factor, WIDEST), foreseen._replace(factor=1.0)
         for factor in (most, most**0.5, most**0.25):
@@ -431,24 +419,13 @@ def _budget(problem: Problem, trial: Trial, tolerance: Mapping[str, Tolerance]) 
     return rows
 
 
-def _stop(problem: Problem, best: np.ndarray) -> str:
-    """What a further step would have lost, if the search ended for that reason."""
-    near = [t for t in problem.trials.values() if t.lost and float(np.max(np.abs(t.place - best))) < NEAR_STOP]
-    return near[-1].lost if near else ""
-
-
-def _described(
-    problem: Problem,
-    best: np.ndarray,
-    tolerance: Mapping[str, Tolerance],
-    check: int,
-    say: Callable[[str, int, int], None],
-) -> Design:
+def _described(problem: Problem, best: np.ndarray, checked: Checked | None) -> Design:
     """All that is known of the best place."""
     space, wanted = problem.space, problem.wanted
     trial, own, x = problem.at(best), problem.at(space.place), best[problem.free]
     names = np.array(space.names)[problem.free].tolist()
     slack, prices, conflict = trial.slack, dict[str, float](), tuple[str, ...]()
+    near = [t for t in problem.trials.values() if t.lost and float(np.max(np.abs(t.place - best))) < NEAR_STOP]
     feasible = not trial.lost and bool(np.all(slack >= -KEPT))
     if feasible:
         binding = np.flatnonzero(slack < ACTIVE)
@@ -471,10 +448,10 @@ def _described(
         prices=prices,
         at_bound=tuple(n for n, v in zip(names, x, strict=True) if min(v, 1 - v) < AT_BOUND),
         worst=trial.worst,
-        budget=_budget(problem, trial, tolerance) if problem.cost is not None and feasible else [],
-        stopped_by=_stop(problem, best),
+        budget=_budget(problem, trial) if wanted and feasible else [],
+        stopped_by=near[-1].lost if near else "",
         notes=tuple(dict.fromkeys(problem.range.handed_over)),
         evaluations=problem.evaluations,
         path=[space.values(t.place) | {"cost": t.cost} for t in problem.trials.values() if not t.lost],
-        checked=check_design(space.model(best), problem.operating, check, say) if check and not trial.lost else None,
+        checked=checked,
     )

@@ -37,16 +37,15 @@ DESIGNS, SPREAD = 64, 0.05
 
 @dataclasses.dataclass(frozen=True)
 class Slopes:
-    """A value, and its change with relative changes of parameters, or of some that change together."""
+    """A value, and its change with relative changes of parameters, or of some that change together: derivatives by the
+    logarithm of each parameter [unit], and the covariance of value and derivatives, 0 where they are exact."""
 
     name: str
     unit: str
     value: float
     directions: tuple[str, ...]
     by_relative_change: Float[np.ndarray, " n"]
-    """Derivative of the value by the logarithm of each parameter [unit]."""
     covariance: Float[np.ndarray, "1+n 1+n"]
-    """Covariance of the value and the derivatives [unit^2]; 0 where they are exact."""
 
     @classmethod
     def of(cls, edge: "Sensitivity | Slopes") -> "Slopes":
@@ -92,6 +91,13 @@ class Slopes:
         weight = np.append(-by / value, self._chosen(names)) / value
         return by / value, _deviation(weight, self.covariance)
 
+    def __str__(self) -> str:
+        rows = zip(self.directions, self.elasticity, self.elasticity_error, strict=True)
+        head = f"{self.name} {self.value:.4g} +- {self.value_error:.2g} {self.unit}"
+        return "\n".join([head, *(f"  {name:<28} {value:+.3f} +- {error:.3f}" for name, value, error in rows)])
+
+    _repr_html_ = notebook_html
+
     def _chosen(self, names: Sequence[str]) -> Float[np.ndarray, " n"]:
         if unknown := [name for name in names if name not in self.directions]:
             raise ArgumentError("names", said=f"must be among {', '.join(self.directions)}, but has '{unknown[0]}'.")
@@ -105,14 +111,12 @@ def _deviation(weight: np.ndarray, covariance: np.ndarray) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class StatisticGradient(Slopes):
-    """A statistic and its slopes; the value is the mean over all designs and initial states."""
+    """A statistic, the mean over all designs and initial states, with its slopes; the mean of the last block of the
+    runs less that of the first, NaN of one block; and the share of the scatter of the pairs that the slopes explain."""
 
     drift: float
-    """Mean of the last block of the runs less that of the first: a value that drifts has not settled. NaN of one block.
-    """
     drift_error: float
     explained: float
-    """Share of the scatter of the pairs that the slopes explain, 0 to 1."""
 
     @property
     def settled(self) -> bool:
@@ -122,17 +126,14 @@ class StatisticGradient(Slopes):
 
 @dataclasses.dataclass(frozen=True)
 class MeanGradient:
-    """Gradients of statistics around a design."""
+    """Gradients of statistics around a design with some values [SI]: pairs of designs that were run to their ends,
+    designs that failed, which are left out with their partners, and lanes that are `inaccurate`, which count."""
 
     statistics: dict[str, StatisticGradient]
     values: dict[str, float]
-    """Parameters of the design [SI]."""
     pairs: int
-    """Number of pairs of designs that were run to their ends."""
     failed: int
-    """Number of designs that failed, and are left out with their partners."""
     inaccurate: int
-    """Number of lanes that are `inaccurate`, which count."""
 
     def slope(self, statistic: str, parameter: str) -> tuple[float, float]:
         """Derivative by one parameter that changes alone [unit of the statistic per SI unit], with its error."""
@@ -140,12 +141,7 @@ class MeanGradient:
         return slope / self.values[parameter], error / abs(self.values[parameter])
 
     def __str__(self) -> str:
-        lines = [f"Elasticities from {self.pairs} pairs of designs"]
-        for each in self.statistics.values():
-            lines.append(f"{each.name} {each.value:.4g} +- {each.value_error:.2g} {each.unit}")
-            rows = zip(each.directions, each.elasticity, each.elasticity_error, strict=True)
-            lines += [f"  {name:<28} {value:+.3f} +- {error:.3f}" for name, value, error in rows]
-        return "\n".join(lines)
+        return "\n".join([f"Elasticities from {self.pairs} pairs of designs", *map(str, self.statistics.values())])
 
     _repr_html_ = notebook_html
 
@@ -162,20 +158,17 @@ def mean_gradient(
 ) -> MeanGradient:
     """Gradients of statistics by parameters of the design, with standard errors.
 
-    **Arguments:**
+    **Arguments:** design; how designs are run, in two blocks to see a drift; names, or statistics by name;
 
-    - `model`: the design; `runs`: how designs are run, in two blocks to see a drift.
-    - `statistics`: names, or statistics by name. The largest exponent need not depend smoothly on the design: its
-        slope is the mean slope over the box of designs.
     - `directions`: parameters that are not 0; those joined by `+` change by the same factor.
     - `designs`: number of designs, even; each parameter is moved up in half of them and down in the others, by half
         of `spread` to all of it. Errors fall with the root of their number, and with a larger spread.
     - `spread`: relative half width of the box of designs, above 0 and at most 0.3. Finer structure is smoothed away;
         the slope is off by at most a sixth of spread^2 times the third derivative.
-    - `seed`: seed of the designs.
 
     **Returns:** `MeanGradient`. Standard errors are those of the designs' scatter around the fitted slopes: chaos,
-    motions that coexist, and curvature of third order are in them.
+    motions that coexist, and curvature of third order are in them. The largest exponent need not depend smoothly on the
+    design: its slope is the mean slope over the box of designs.
 
     **Raises:** `ValueError` for parameters that are unknown or 0, a box of designs that leaves a parameter's range,
     counts that are impossible, too few designs for the directions; if too many of them fail.
@@ -190,8 +183,7 @@ def mean_gradient(
     if not 0 < spread <= 0.3:
         raise ArgumentError("spread", said=f"must be above 0 and at most 0.3, but {spread:g} was given.")
     moved = spread * _moves(designs // 2, len(directions), seed)
-    changed = lambda row: {n: values[n] * (1 + by) for d, by in zip(directions, row) for n in d.split("+")}
-    boxed = [replace(model, **changed(row)) for row in np.concatenate([moved, -moved]).tolist()]
+    boxed = moved_designs(model, values, np.concatenate([moved, -moved]), directions)
     swept = runs.run(boxed)
     found = {name: each.samples(boxed, swept).mean(axis=(1, 2)) for name, each in chosen.items()}
     failed = ~np.all([np.isfinite(blocks).all(axis=1) for blocks in found.values()], axis=0)
@@ -220,6 +212,18 @@ def moved_parameters(model: AbstractForcedSystem, names: Sequence[str], argument
         if names.count(name) > 1:
             raise ArgumentError(argument, said=f"must name each parameter once, but has '{name}' twice.")
     return {name: float(known[name]) for name in names}
+
+
+def moved_designs(
+    model: AbstractForcedSystem,
+    values: Mapping[str, float],
+    moved: Float[np.ndarray, "designs n"],
+    directions: Sequence[str] | None = None,
+) -> list[AbstractForcedSystem]:
+    """Designs with relative changes of parameters; those joined by + in a direction change together."""
+    names = directions or tuple(values)
+    changed = lambda row: {n: values[n] * (1 + by) for d, by in zip(names, row, strict=True) for n in d.split("+")}
+    return [replace(model, **changed(row)) for row in moved.tolist()]
 
 
 def _moves(pairs: int, directions: int, seed: int) -> Float[np.ndarray, "pairs directions"]:

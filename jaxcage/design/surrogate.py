@@ -39,18 +39,15 @@ Values = Callable[[Models], Float[np.ndarray, " designs"]]
 
 @dataclasses.dataclass(frozen=True)
 class Optimum:
-    """The best design of a search."""
+    """The best design of a search with the parameters that were varied [SI]; those that ended at a bound, which chose
+    there in place of the objective; the best value of each batch. It is not `changed` if no other design was better."""
 
     model: AbstractForcedSystem
     values: dict[str, float]
-    """Parameters that were varied [SI]."""
     objective: float
     at_bound: tuple[str, ...]
-    """Parameters that ended at a bound: there the bound chose, not the objective."""
     history: tuple[float, ...]
-    """Best value of each batch."""
     changed: bool
-    """False if the given design stays, because no other was better."""
 
     def __str__(self) -> str:
         rows = [f"Optimum after {len(self.history)} batches: {self.objective:.6g}"]

@@ -55,32 +55,19 @@ WHOLE = 0.9
 """Share of a range above which it is left whole."""
 
 
-def run_draws(
-    model: CageModel,
-    unknowns: Sequence[Unknown],
-    place: Float[np.ndarray, "draws unknowns"],
-    speeds: Float[np.ndarray, " speeds"],
-    *,
-    discard: int = REVOLUTIONS,
-    revolutions: int = REVOLUTIONS,
-    blocks: int = 20,
-    method: AbstractMethod | None = None,
-    progress: Progress | None = None,
+def _run_draws(
+    model: CageModel, unknowns: Sequence[Unknown], place: np.ndarray, speeds: Any, method: Any, **more: Any
 ) -> tuple[list[CageModel], xr.Dataset]:
     """Designs with the values at `place` in the ranges, and their sweep, each from its own conventional initial state:
-    a state in which the cage of one design rests on its rib would press that of another into it.
-
-    **Raises:** `ValueError` if nothing is unknown, or for values that do not go together.
-    """
-    _require_some(unknowns)
+    a state in which the cage of one design rests on its rib would press that of another into it."""
     models = []
     for row in place:
         values = {name: float(u.range.at(p)) for u, p in zip(unknowns, row, strict=True) for name in u.names}
         models.append(replace(model, **values))
         check_together(models[-1])
-    settled, method = SETTLED if discard >= SETTLED else 0, native(error=ERROR) if method is None else method
-    told = {"method": method, "progress": progress}
-    return models, Runs(speeds, 1, discard, revolutions, blocks, keep=32, settled=settled, **told).run(models)
+    given: dict[str, Any] = {"discard": REVOLUTIONS, "revolutions": REVOLUTIONS, "blocks": 20, "keep": 32} | more
+    settled, method = SETTLED if given["discard"] >= SETTLED else 0, method or native(error=ERROR)
+    return models, Runs(speeds, settled=settled, method=method, **given).run(models)
 
 
 def _require_some(unknowns: Sequence[Unknown]) -> None:
@@ -103,22 +90,18 @@ class Clue(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Ensemble:
-    """Chaos of designs that are drawn from ranges."""
+    """Chaos of designs that are drawn from ranges: unknowns with `sources`, how to measure each, and their SI `units`;
+    place of each draw in each range, 0 to 1; speeds [rad/s]; where a draw is chaotic while observed, or failed."""
 
     unknowns: tuple[Unknown, ...]
     sources: tuple[str, ...]
-    """How to measure each unknown."""
     place: Float[np.ndarray, "draws unknowns"]
-    """Place of each draw in each range, 0 to 1."""
     speed: Float[np.ndarray, " speeds"]
-    """[rad/s]."""
     chaotic: Bool[np.ndarray, "draws speeds"]
-    """True where a draw is chaotic while observed."""
     failed: Bool[np.ndarray, "draws speeds"]
     discard: int
     revolutions: int
     units: tuple[str, ...] = ()
-    """SI units of the unknowns."""
 
     @property
     def rpm(self) -> Float[np.ndarray, " speeds"]:
@@ -217,19 +200,21 @@ def ensemble(
     seed: int = 0,
     discard: int = REVOLUTIONS,
     revolutions: int = REVOLUTIONS,
+    method: AbstractMethod | None = None,
     **more: Any,
 ) -> Ensemble:
     """Run `draws` designs, spread evenly over the ranges, over speed.
 
     **Arguments:** design; what is unknown of it; ascending speeds [rad/s]; number and seed of the draws (scrambled
-    Sobol points); revolutions left out and observed; more as `run_draws` takes it.
+    Sobol points); revolutions left out and observed; method; more as `Runs` takes it.
 
     **Raises:** `ValueError` if nothing is unknown, nothing is drawn, or values from the ranges do not go together.
     """
     _require_some(unknowns)
     require_at_least(1, draws=draws)
     place, info = sobol(len(unknowns), draws, seed), parameter_info(model)
-    _, found = run_draws(model, unknowns, place, speeds, discard=discard, revolutions=revolutions, **more)
+    more |= {"discard": discard, "revolutions": revolutions}
+    _, found = _run_draws(model, unknowns, place, speeds, method, **more)
     rough, lost, at = restless(found), failed(found)[..., 0], np.asarray(speeds, dtype=float)
     sources, units = zip(*((info[u.names[0]].source, info[u.names[0]].unit) for u in unknowns), strict=True)
     return Ensemble(tuple(unknowns), sources, place, at, rough, lost, discard, revolutions, units)
@@ -240,22 +225,18 @@ def ensemble(
 
 @dataclasses.dataclass(frozen=True)
 class Narrowed:
-    """Ranges that are narrowed by measurements."""
+    """Ranges that are narrowed by measurements: ends of each new range in the old one, 0 to 1, and the median of the
+    accepted draws; draws of the last stage that meet all measurements, of all that each stage has; stages; how far the
+    best draw is from each measurement, in tolerances."""
 
     unknowns: tuple[Unknown, ...]
-    """The ranges before."""
     lower: Float[np.ndarray, " unknowns"]
-    """Place of each new range in the old one, 0 to 1."""
     upper: Float[np.ndarray, " unknowns"]
     middle: Float[np.ndarray, " unknowns"]
-    """Median of the accepted draws."""
     accepted: int
-    """Draws of the last stage that meet all measurements."""
     draws: int
-    """Draws of each stage."""
     stages: int
     nearest: Float[np.ndarray, " measurements"]
-    """How far the best draw is from each measurement, in tolerances."""
 
     @property
     def share(self) -> Float[np.ndarray, " unknowns"]:
@@ -333,7 +314,7 @@ def misses(
     """Distance of each draw from each measurement, in tolerances; NaN where it failed. A cage that is chaotic rattles:
     its distance is 0 if that is right, else `FAR`."""
     rpm = np.unique([m.cage_rpm for m in measured])
-    models, found = run_draws(model, unknowns, place, rpm * np.pi / 30, method=method, progress=progress)
+    models, found = _run_draws(model, unknowns, place, rpm * np.pi / 30, method, progress=progress)
     size, order = motions(models, found, method=native(error=ERROR))
     columns = []
     for m in measured:

@@ -23,20 +23,17 @@ RESAMPLES, TAIL = 2000, 2.5
 
 @dataclasses.dataclass(frozen=True)
 class SobolIndices:
-    """Shares of a variance, with 95 % intervals by the bootstrap."""
+    """Shares of a variance due to a parameter alone, and with all its interactions, with 95 % intervals by the
+    bootstrap; evaluations, and base samples. `scatter` is the share of the motion itself, by the blocks of each run: it
+    belongs to no parameter, and total indices contain it. Drift between the blocks counts as scatter."""
 
     first: dict[str, float]
-    """Share due to a parameter alone."""
     total: dict[str, float]
-    """Share due to a parameter and all its interactions."""
     first_interval: dict[str, tuple[float, float]]
     total_interval: dict[str, tuple[float, float]]
     evaluations: int
     samples: int
-    """Base samples."""
     scatter: float = 0.0
-    """Share of the variance that is scatter of the motion itself, by the blocks of each run. It belongs to no
-    parameter, and total indices contain it. Drift between the blocks counts as scatter."""
 
     @property
     def doubtful(self) -> tuple[str, ...]:

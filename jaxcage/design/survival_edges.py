@@ -16,14 +16,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._errors import ArgumentError
-from .._parameters import replace
 from ..analysis import LIFE_BLOCK, Hazard, Zone, hazard
 from ..lanes import Plan, Progress, Run, run_lanes
 from ..models import CageModel
 from ..orbits import Sensitivity
-from ..quantities import notebook_html
 from ..solve import AbstractMethod
-from .slopes import Slopes, moved_parameters
+from .design_space import Models
+from .slopes import Slopes, moved_designs, moved_parameters
 
 
 NAMES = ("guidance_gap", "eccentricity")
@@ -44,13 +43,12 @@ CERTAIN = 3.0
 
 @dataclasses.dataclass(frozen=True)
 class LastingEdge(Slopes):
-    """Speed [rpm] at which the mean life of chaos passes the horizon, and its slopes."""
+    """Speed [rpm] at which the mean life of chaos passes the horizon, and its slopes; middle and half width of the
+    speeds of the last round; change of the logarithm of the escape rate with speed [1/rpm]."""
 
     horizon: int
     window_rpm: tuple[float, float]
-    """Middle and half width of the speeds of the last round."""
     steepness: float
-    """Change of the logarithm of the escape rate with speed [1/rpm]."""
     fit: Hazard
 
     @property
@@ -60,14 +58,6 @@ class LastingEdge(Slopes):
         if not max(abs(self.value - middle), CERTAIN * self.value_error) < half:
             return "no edge: the mean life does not pass the horizon among these speeds"
         return "converged" if self.fit.p_value >= LIKELY else "the rate of escapes is not log-linear here"
-
-    def __str__(self) -> str:
-        lanes = f"{self.fit.escapes} of {self.fit.lanes} chaotic lanes escaped by revolution {self.horizon}"
-        head = f"{self.value:.0f} +- {self.value_error:.0f} rpm, elasticities ({lanes}; {self.status})"
-        each = zip(self.directions, self.elasticity, self.elasticity_error, strict=True)
-        return "\n".join([head, *(f"  {name:<28} {value:+.3f} +- {error:.3f}" for name, value, error in each)])
-
-    _repr_html_ = notebook_html
 
 
 def lasting_edge(
@@ -84,14 +74,9 @@ def lasting_edge(
 ) -> LastingEdge:
     """Solve for an edge of lasting chaos and its elasticities, by survival regression.
 
-    **Arguments:**
-
-    - `model`: the design.
-    - `rpm`, `within_rpm`: speed of the edge and its uncertainty, as a sweep gives them.
-    - `names`: parameters; each costs no more, but all answers become less certain.
-    - `designs`: designs of each of four rounds, each at a speed of its own, from all starts of the model.
-    - `horizon`: mean life of chaos at the edge [revolutions].
-    - `seed`: seed of the draws; `method`, `progress`: as in `sweep`.
+    **Arguments:** design; speed of the edge and its uncertainty, as a sweep gives them; parameters, each of which costs
+    no more, but makes all answers less certain; designs of each of four rounds, each at a speed of its own, from all
+    starts of the model; mean life of chaos at the edge [revolutions]; seed; method and progress as in `sweep`.
 
     **Returns:** `LastingEdge`; its `status` says where the numbers should not be used.
 
@@ -102,16 +87,16 @@ def lasting_edge(
         raise ArgumentError("within_rpm", said=f"must be positive, but {within_rpm} was given.")
     if horizon <= DISCARD + OBSERVED:
         raise ArgumentError("horizon", said=f"must be above {DISCARD + OBSERVED} revolutions, but {horizon} was given.")
-    base = np.array(list(moved_parameters(model, names, "names").values()))
-    rng = np.random.default_rng(seed)
-    edge, window = float(rpm), float(within_rpm)
-    elasticity = np.zeros(len(names))
+    base, rng = moved_parameters(model, names, "names"), np.random.default_rng(seed)
+    length = {"discard": DISCARD, "revolutions": OBSERVED, "blocks": OBSERVED // LIFE_BLOCK, "horizon": horizon}
+    run = Run.of(model, confirm=False, method=method, **length)
+    edge, window, elasticity = float(rpm), float(within_rpm), np.zeros(len(names))
     speed, change, times = np.empty(0), np.empty((0, len(names))), np.empty(0)
     found = None
     for _ in range(ROUNDS):  # all rounds count in the end
         moved = rng.normal(size=(designs, len(names))).clip(-2, 2) * SPREAD
         at = (edge + window * rng.uniform(-1, 1, designs)) * (1 + moved @ elasticity)
-        new, end = _escapes(model, names, base * (1 + moved), at, horizon, method, progress)
+        new, end = _escapes(moved_designs(model, base, moved), at, run, progress)
         each = new.shape[1]
         speed, times = np.append(speed, np.repeat(at, each)), np.append(times, new)
         change = np.vstack([change, np.repeat(moved, each, axis=0)])
@@ -133,29 +118,15 @@ def lasting_edges(model: CageModel, zone: Zone, **options: object) -> dict[str, 
 
 
 def _escapes(
-    model: CageModel,
-    names: Sequence[str],
-    values: Float[np.ndarray, "designs n"],
-    rpm: Float[np.ndarray, " designs"],
-    horizon: int,
-    method: AbstractMethod | None,
-    progress: Progress | None,
+    designs: Models, rpm: Float[np.ndarray, " designs"], run: Run, progress: Progress | None
 ) -> tuple[Float[np.ndarray, "designs starts"], int]:
     """Revolutions after which the lanes of each design are calm; and revolutions to which they were followed."""
-    designs = [replace(model, **dict(zip(names, row.tolist(), strict=True))) for row in values]
-    length = {"discard": DISCARD, "revolutions": OBSERVED, "blocks": OBSERVED // LIFE_BLOCK, "horizon": horizon}
-    run = Run.of(model, confirm=False, method=method, **length)
     found = run_lanes(Plan.one_speed_each(designs, rpm * math.pi / 30), run, progress)
     return found["escape"].values, found.attrs["horizon"]
 
 
 def _fitted(
-    rpm: np.ndarray,
-    change: np.ndarray,
-    times: np.ndarray,
-    about: tuple[float, float],
-    horizon: int,
-    names: tuple[str, ...],
+    rpm: Any, change: Any, times: Any, about: tuple[float, float], horizon: int, names: tuple[str, ...]
 ) -> LastingEdge:
     """The edge by a law of escapes whose logarithm is a square of the speed, or linear where that is not steep."""
     scale = np.maximum(np.std(change, axis=0), 1e-12)
@@ -178,8 +149,8 @@ def _fitted(
         if abs(steep) > abs(fit.coefficients[1]) / 2:  # false for NaN; near the vertex of a square there is no edge
             break
     covariance = np.asarray(jacobian) @ fit.covariance @ np.asarray(jacobian).T
-    known = "edge", "rpm", float(found[0]), names, np.asarray(found[1:]), covariance
-    return LastingEdge(*known, horizon, about, float(steep) / window, fit)
+    slopes = float(found[0]), names, np.asarray(found[1:]), covariance
+    return LastingEdge("edge", "rpm", *slopes, horizon, about, float(steep) / window, fit)
 
 
 SolvedEdge = LastingEdge | Sensitivity
