@@ -124,7 +124,7 @@ def test_an_open_zone_has_no_width_and_the_gradient_of_its_one_edge(planted):
     for end, sign, missing in (("exit", 1.0, "onset"), ("onset", -1.0, "exit")):
         width = zone_width({f"zone 2 {end}": found}, 2)
         assert width.open and width.trusted and width.status == f"open: no {missing} within the range"
-        assert width.width_rpm is None and width.standard_error_rpm is None
+        assert np.isnan(width.value)
         by, error = width.change(*NAMES)
         assert by == pytest.approx(sign * found.value * found.elasticity_of(*NAMES)[0])
         assert error == pytest.approx(found.value * found.elasticity_of(*NAMES)[1], rel=0.01)

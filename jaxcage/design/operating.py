@@ -244,16 +244,15 @@ class UnstableWidth(_AroundEdges):
         low, high = (end * RPM for end in self.operating)
         total, slope = 0.0, np.zeros(len(self.space.names))
         for zone in sorted({name.rsplit(" ", 1)[0] for name in near.edges}):
-            here = {end: found[f"{zone} {end}"] for end in ("onset", "exit") if f"{zone} {end}" in found}
-            if len(here) == 2 and all(f.ended == "turned back" for f in here.values()):
+            both = {end: found.get(f"{zone} {end}") for end in ("onset", "exit")}
+            if all(f is not None and f.ended == "turned back" for f in both.values()):
                 continue
-            if lost := [f"{zone} {end}: {f.ended}" for end, f in here.items() if f.edge is None]:
-                return "; ".join(lost)
-            for end, sign, bound in (("onset", -1.0, low), ("exit", 1.0, high)):
-                edge = here[end].edge if end in here else None
-                if edge is not None and low < edge.value_rpm < high:
-                    slope = slope + sign * self.space.slope_of(edge.derivative)
-                total += sign * (bound if edge is None else float(np.clip(edge.value_rpm, low, high)))
+            for (end, f), sign, at in zip(both.items(), (-1.0, 1.0), (low, high), strict=True):
+                if f is not None and f.edge is None:
+                    return f"{zone} {end}: {f.ended}"
+                if f is not None and f.edge is not None and low < (at := f.edge.value_rpm) < high:
+                    slope = slope + sign * self.space.slope_of(f.edge.derivative)
+                total += sign * float(np.clip(at, low, high))
         if all(f.edge is not None for f in found.values()):
             self._keep(near, place, {name: f.edge for name, f in found.items()})
         width = {"width": Value(total, slope)}

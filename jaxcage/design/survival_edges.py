@@ -158,65 +158,39 @@ SolvedEdge = LastingEdge | Sensitivity
 
 
 @dataclasses.dataclass(frozen=True)
-class ZoneWidth:
-    """Width of a zone, of lasting chaos or of synchronous loss, and its change with parameters.
+class ZoneWidth(Slopes):
+    """Width of a zone [rpm], of lasting chaos or of synchronous loss, exit less onset, and its slopes.
 
-    Each edge has an error of its own; the gradient of an exact edge has none. A zone that is cut by the range is open,
-    with None for the edge beyond it: it has no width, but its gradient is that of the other edge.
+    Each edge has an error of its own; the gradient of an exact edge has none. A zone that is cut by the range is open:
+    its width is NaN, and its slopes are those of its one edge. It is trusted if all edges that it has are converged;
+    `status` says `converged`, `open: ...`, or which edge should not be used, and why.
     """
 
-    onset: SolvedEdge | None
-    exit: SolvedEdge | None
-
-    @property
-    def open(self) -> bool:
-        """True if the range cuts it."""
-        return self.onset is None or self.exit is None
-
-    @property
-    def trusted(self) -> bool:
-        """True if all edges that it has are converged."""
-        return all(edge is None or edge.status == "converged" for edge in (self.onset, self.exit))
-
-    @property
-    def status(self) -> str:
-        """`converged`, `open: ...`, or which edge should not be used, and why."""
-        ends = {"onset": self.onset, "exit": self.exit}
-        bad = [f"{name}: {edge.status}" for name, edge in ends.items() if edge and edge.status != "converged"]
-        missing = [f"open: no {name} within the range" for name, edge in ends.items() if edge is None]
-        return "; ".join([*missing, *bad]) or "converged"
-
-    @property
-    def width_rpm(self) -> float | None:
-        """Exit less onset; None for an open zone."""
-        return None if self.open else sum(sign * edge.value for sign, edge in self._ends())
-
-    @property
-    def standard_error_rpm(self) -> float | None:
-        """Standard error of the width; for an exact edge its distance to that by half the steps counts."""
-        return None if self.open else math.hypot(*(edge.value_error for _, edge in self._ends()))
-
-    def change(self, *names: str) -> tuple[float, float]:
-        """Change of the width when parameters grow together [rpm by their relative change], with its standard error;
-        for an open zone that of its one edge."""
-        found = [(sign, *edge.change(*names)) for sign, edge in self._ends()]
-        return sum(sign * by for sign, by, _ in found), math.hypot(*(error for *_, error in found))
-
-    def _ends(self) -> list[tuple[float, Slopes]]:
-        """The edges, each with the sign with which it counts."""
-        ends = (-1.0, self.onset), (1.0, self.exit)
-        return [(sign, Slopes.of(edge)) for sign, edge in ends if edge is not None]
+    open: bool
+    trusted: bool
+    status: str
 
 
 def zone_width(edges: Mapping[str, SolvedEdge], zone: int = 1) -> ZoneWidth:
-    """Width of a zone, exit less onset [rpm], and its change with the design, with standard errors.
+    """Width of a zone and its change with the parameters of all its edges, with standard errors.
 
     **Arguments:** edges by name, `zone 1 onset` and the like, as `jaxcage.orbits.sensitivities` has them, or `onset`
     and `exit`, as `lasting_edges` does; number of the zone.
 
     **Raises:** `ValueError` for a zone of which no edge is known.
     """
-    ends = [edges.get(f"zone {zone} {end}", edges.get(end)) for end in ("onset", "exit")]
-    if not any(ends):
+    both = {end: edges.get(f"zone {zone} {end}", edges.get(end)) for end in ("onset", "exit")}
+    solved = {end: edge for end, edge in both.items() if edge is not None}
+    if not solved:
         raise ArgumentError("zone", said=f"must be one with an edge among {', '.join(edges)}, but is {zone}.")
-    return ZoneWidth(*ends)
+    missing = [f"open: no {end} within the range" for end in both if end not in solved]
+    bad = [f"{end}: {edge.status}" for end, edge in solved.items() if edge.status != "converged"]
+    ends = [(1.0 if end == "exit" else -1.0, Slopes.of(edge)) for end, edge in solved.items()]
+    names = [n for n in ends[0][1].directions if all(n in edge.directions for _, edge in ends)]
+    at = [[0, *(1 + edge.directions.index(n) for n in names)] for _, edge in ends]
+    each = [s * np.append(e.value, e.by_relative_change)[i] for (s, e), i in zip(ends, at, strict=True)]
+    value, *by = np.sum(each, axis=0).tolist()
+    covariance = np.sum([e.covariance[np.ix_(i, i)] for (_, e), i in zip(ends, at, strict=True)], axis=0)
+    slopes = math.nan if missing else value, tuple(names), np.array(by), covariance
+    status = "; ".join([*missing, *bad]) or "converged"
+    return ZoneWidth(f"zone {zone} width", "rpm", *slopes, bool(missing), not bad, status)

@@ -156,11 +156,7 @@ def _whose(table: Mapping[str, Any], subject: Subject = "cage") -> Whose:
 
 
 def _build(
-    kind: type[eqx.Module],
-    table: Mapping[str, Any],
-    start: eqx.Module | None,
-    path: tuple[str, ...],
-    ranges: Ranges,
+    kind: type[eqx.Module], table: Mapping[str, Any], start: eqx.Module | None, path: tuple[str, ...], ranges: Ranges
 ) -> eqx.Module:
     """A module of `kind` from its table; values not in the table come from `start`, or from the defaults."""
     table, nested, fields = dict(table), submodules(kind), list(values(kind))
@@ -187,11 +183,7 @@ def _build(
 
 
 def _build_chosen(
-    options: tuple[type[eqx.Module], ...],
-    table: Any,
-    start: eqx.Module | None,
-    path: tuple[str, ...],
-    ranges: Ranges,
+    options: tuple[type[eqx.Module], ...], table: Any, start: eqx.Module | None, path: tuple[str, ...], ranges: Ranges
 ) -> eqx.Module:
     """A sub-table, which chooses its law with `kind` where there are several."""
     if not isinstance(table, Mapping):

@@ -160,7 +160,8 @@ def width_table(title: str, edges: Mapping[str, SolvedEdge], names: Sequence[str
         width: ZoneWidth = zone_width(edges, int(zone.rpartition(" ")[2]))
         row = {"name": zone, **chosen(width, "open status")}
         if width.trusted:
-            row |= chosen(width, "width_rpm standard_error_rpm")
+            known = (None, None) if width.open else (width.value, width.value_error)
+            row |= dict(zip(("width_rpm", "standard_error_rpm"), known, strict=True))
             row |= _with_errors({n: width.change(*of) for n, of in _asked(names).items()}, 0.01)
         rows.append(row)
     columns = [Column("zone", (), key="name"), Column("width", (), key="width_rpm", errors="standard_error_rpm")]
