@@ -263,6 +263,14 @@ def test_the_least_width_of_an_unstable_range():
     assert abs(found.values["y"]) < 0.02 and found.cost == pytest.approx(30 / np.pi * 0.2, rel=5e-3)
 
 
+def test_an_unstable_range_that_is_born_stops_the_search_there():
+    """The largest multiplier between is exp(2 pi k (-d)/x) at x, and passes 1 where d = 0; no edge bounds the range."""
+    begin, reward = window(y=0.0, d=-0.2, k=-0.5), lambda system: 1 - system.rates.d
+    found = jc.design_for(begin, (0.8, 1.2), {"d": (-0.3, 0.3)}, KEEP, reward, check=0)
+    assert found.feasible and found.values["d"] == pytest.approx(0.0, abs=1e-3) and not found.notes
+    assert set(found.prices) == {"no unstable speeds between"}
+
+
 REFUSED = [
     (dict(operating=(2.0, 1.2)), "`operating` must be two positive speeds, ascending, but are 2 and 1.2"),
     (dict(vary={"z": (0.0, 1.0)}), "`z` must be a parameter of the design: x, y, d, k, s, r"),

@@ -1,7 +1,7 @@
 """What is required of a design over its operating range, what the design costs, and tolerances of manufacture."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -178,37 +178,3 @@ def widened(model: Any, vary: Bounds, tolerance: Mapping[str, Tolerance]) -> dic
             low, *_, high = sorted([*each.ends(known[name]), known[name]])
             bounds[name] = low - 0.5 * (high - low), high + 0.5 * (high - low)
     return bounds
-
-
-def corner(
-    space: DesignSpace,
-    place: Float[np.ndarray, " n"],
-    slope: Float[np.ndarray, " n"],
-    tolerance: Mapping[str, Tolerance],
-) -> Float[np.ndarray, " n"]:
-    """The place within the tolerances at which something with this slope is least."""
-    there = place.copy()
-    for i, (name, value) in enumerate(space.values(place).items()):
-        if name in tolerance:
-            end = tolerance[name].ends(value)[0 if slope[i] > 0 else 1]
-            there[i] = (end - space.lower[i]) / space.span[i]
-    return there
-
-
-def budget_of(
-    space: DesignSpace,
-    tolerance: Mapping[str, Tolerance],
-    slack_slope: Float[np.ndarray, "m n"],
-    slack: Float[np.ndarray, " m"],
-    wanted: Sequence[Requirement],
-) -> list[Budget]:
-    """How wide each tolerance may be, from the slacks that are left at the worst corners, at first order."""
-    rows = []
-    for i, name in enumerate(space.names):
-        if name in tolerance:
-            width = tolerance[name].upper - tolerance[name].lower
-            takes = np.abs(slack_slope[:, i]) * width / 2 / space.span[i]
-            room = np.divide(np.maximum(slack, 0.0), takes, out=np.full(takes.size, np.inf), where=takes > 0)
-            k = int(np.argmin(room))
-            rows.append(Budget(name, width, 1 + float(room[k]), wanted[k].name if np.isfinite(room[k]) else ""))
-    return rows

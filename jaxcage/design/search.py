@@ -30,8 +30,6 @@ from .requirements import (
     Requirement,
     Requirements,
     Tolerance,
-    budget_of,
-    corner,
     cost_function,
     listed,
     widened,
@@ -130,7 +128,7 @@ class Problem:
         wanted: list[Requirement],
         cost: Callable[[Any], Any] | None,
         free: np.ndarray,
-        tolerance: Mapping[str, Tolerance],
+        tolerance: dict[str, Tolerance],
     ):
         self.space, self.operating, self.wanted, self.free = range_.space, range_.operating, wanted, free
         self.range, self.cost, self.tolerance = range_, cost, tolerance
@@ -192,19 +190,16 @@ class Problem:
         """What each requirement concerns for the worst bearing within tolerances; or why that is not known."""
         found = {}
         for r in self.wanted:
-            there = corner(self.space, place, r.slack(values[r.of])[1], tolerance)
+            there, (_, slope) = place.copy(), r.slack(values[r.of])
+            for i, (name, value) in enumerate(self.space.values(place).items()):
+                if name in tolerance:
+                    end = tolerance[name].ends(value)[0 if slope[i] > 0 else 1]
+                    there[i] = (end - self.space.lower[i]) / self.space.span[i]
             made = self._values(there) if tolerance else values
             if isinstance(made, str):
                 return made
             found[r.name] = made[r.of]
         return found
-
-    def broken(self, trial: Trial, tolerance: Mapping[str, Tolerance]) -> str:
-        """The requirement that does not hold within other tolerances, or what is lost there; empty if all hold."""
-        made = self.worst(trial.place, trial.values, tolerance)
-        if isinstance(made, str):
-            return made
-        return next((r.name for r in self.wanted if r.slack(made[r.name])[0] < -KEPT), "")
 
     def whole(self, x: np.ndarray, like: np.ndarray) -> np.ndarray:
         """The place of the parameters that vary, the others as they are at `like`."""
@@ -255,7 +250,7 @@ def design_for(
     low, high = operating
     if not 0 < low < high < float("inf"):
         raise ArgumentError("operating", said=f"must be two positive speeds, ascending, but are {low:g} and {high:g}.")
-    tolerance = tolerance or {}
+    tolerance = dict(tolerance or {})
     space = DesignSpace.of(model, widened(model, vary, tolerance))
     free = np.array([name in vary for name in space.names])
     say = progress or (lambda what, done, of: None)
@@ -405,17 +400,26 @@ def _conflict(problem: Problem, trial: Trial, names: list[str]) -> tuple[str, ..
 
 
 def _budget(problem: Problem, trial: Trial) -> list[Budget]:
-    """How wide each tolerance may be while the others stay: foreseen at first order, then solved for at the corners,
-    and less wide until all requirements hold there."""
-    rows, tolerance = [], problem.tolerance
-    for foreseen in budget_of(problem.space, tolerance, trial.slack_slope, trial.slack, problem.wanted):
-        most, found = min(foreseen.factor, WIDEST), foreseen._replace(factor=1.0)
+    """How wide each tolerance may be while the others stay: foreseen at first order from the slacks that are left at
+    the worst corners, then solved for at the corners, and less wide until all requirements hold there."""
+    rows, space, tolerance = [], problem.space, problem.tolerance
+    for i, name in enumerate(space.names):
+        if name not in tolerance:
+            continue
+        width = tolerance[name].upper - tolerance[name].lower
+        takes = np.abs(trial.slack_slope[:, i]) * width / 2 / space.span[i]
+        room = np.divide(np.maximum(trial.slack, 0.0), takes, out=np.full(takes.size, np.inf), where=takes > 0)
+        k, reached = int(np.argmin(room)), 1.0
+        limit = problem.wanted[k].name if np.isfinite(room[k]) else ""
+        most = min(1 + float(room[k]), WIDEST)
         for factor in (most, most**0.5, most**0.25):
-            why = problem.broken(trial, {**tolerance, foreseen.name: tolerance[foreseen.name].times(factor)})
-            found = found._replace(factor=factor if not why else 1.0, limit=why or found.limit)
-            if not why:
+            made = problem.worst(trial.place, trial.values, tolerance | {name: tolerance[name].times(factor)})
+            broken = [] if isinstance(made, str) else [r for r in problem.wanted if r.slack(made[r.name])[0] < -KEPT]
+            if not broken and not isinstance(made, str):
+                reached = factor
                 break
-        rows.append(found)
+            limit = made if isinstance(made, str) else broken[0].name
+        rows.append(Budget(name, width, reached, limit))
     return rows
 
 

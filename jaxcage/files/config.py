@@ -159,7 +159,7 @@ def _build(
     kind: type[eqx.Module], table: Mapping[str, Any], start: eqx.Module | None, path: tuple[str, ...], ranges: Ranges
 ) -> eqx.Module:
     """A module of `kind` from its table; values not in the table come from `start`, or from the defaults."""
-    table, nested, fields = dict(table), submodules(kind), list(values(kind))
+    table, nested, fields = dict(table), submodules(kind), values(kind)
     for (where, key), make in _READY_MADE.items():
         if (where,) == path and key in table:
             start = make(table.pop(key))

@@ -36,7 +36,7 @@ def configuration(model: AbstractForcedSystem) -> dict[str, Any]:
 
 
 def _table(module: eqx.Module) -> dict[str, Any]:
-    fields = list(values(type(module)))
+    fields = values(type(module))
     plain = lambda f: float(getattr(module, f.name)) if "parameter" in f.metadata else getattr(module, f.name)
     table: dict[str, Any] = {f.name: plain(f) for f in fields}
     for name, options in submodules(type(module)).items():
