@@ -196,8 +196,6 @@ class _AroundEdges:
 
     space: DesignSpace
     operating: tuple[float, float]
-    margin: float = 0.0
-    """Per cent of speed beyond both ends over which orbits are followed as well."""
 
     def __post_init__(self):
         low, high = self.operating
@@ -265,8 +263,11 @@ class OperatingRange(_AroundEdges):
     """The edges and orbits of designs around an operating range, and what they are worth.
 
     An edge that ends on the way from design to design, or past which the orbit was unstable already, is replaced by the
-    one that bounds the stable range now; `handed_over` says so in words.
+    one that bounds the stable range now; `handed_over` says so in words. Orbits are followed over a `margin` beyond both
+    ends as well, per cent of their speeds.
     """
+
+    margin: float = 0.0
 
     def _first(self) -> _Anchor:
         (low, high), part = self.operating, self.margin / 100

@@ -285,8 +285,8 @@ def _programme(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) 
     """The best place by sequential programmes within a trust region.
 
     Each programme has the cost itself, where it is cheap, and the requirements linearised with their exact derivatives;
-    SciPy's SLSQP solves it. Its step is one solution of the edges; a step that loses an edge, or gains less than a
-    tenth of what was foreseen, is halved. What the worst requirement falls short is bought at a price that outweighs
+    SciPy's SLSQP solves it. Its step is one solution of the edges; a step that loses an edge is halved, and so is one
+    that gains less than a tenth of what was foreseen, once its linearised requirements have been added. What the worst requirement falls short is bought at a price that outweighs
     the cost, so that the search leads to a feasible place or, where there is none, to the least shortfall.
     """
     trial, radius, largest = problem.at(begin), FIRST_RADIUS, LARGEST_RADIUS
@@ -298,9 +298,11 @@ def _programme(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) 
             break
         new = problem.at(problem.whole(trial.place[problem.free] + step, begin))
         kept = (problem.priced(trial, size) - problem.priced(new, size)) / gain
-        if kept < 0.25 or new.lost:
-            radius = min(radius, float(np.max(np.abs(step)))) / 2
-            largest = radius / 2 if new.lost else largest  # a longer step would lose the edge again
+        reach = min(radius, float(np.max(np.abs(step))))
+        if new.lost:
+            radius, largest = reach / 2, reach / 4  # a longer step would lose the edge again
+        elif kept < 0.25:
+            radius = reach if kept <= 0.1 and not refused else reach / 2  # what was learned is tried first
         elif kept > 0.75:
             radius, largest = min(2 * radius, largest), min(2 * largest, LARGEST_RADIUS)
         if kept > 0.1 and not new.lost:
