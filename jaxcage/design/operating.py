@@ -263,8 +263,8 @@ class OperatingRange(_AroundEdges):
     """The edges and orbits of designs around an operating range, and what they are worth.
 
     An edge that ends on the way from design to design, or past which the orbit was unstable already, is replaced by the
-    one that bounds the stable range now; `handed_over` says so in words. Orbits are followed over a `margin` beyond both
-    ends as well, per cent of their speeds.
+    one that bounds the stable range now; `handed_over` says so in words. Orbits are followed over a `margin` beyond
+    both ends as well, per cent of their speeds.
     """
 
     margin: float = 0.0
@@ -305,12 +305,12 @@ class OperatingRange(_AroundEdges):
         near = self._nearest(place)
         moved = self._followed(near, place)
         found = dict.fromkeys(near.edges) | {name: f.edge for name, f in moved.items()}
-        if all(f.edge is not None and f.edge.bounds for f in moved.values()) and self._stable_ends(place, found):
+        if all(f.edge is not None and f.edge.bounds for f in moved.values()):
             sizes = self._between(place, found)[1]
-            if np.all(sizes < 1):
-                self._keep(near, place, found)
-                return found
             if any(sizes[k] >= 1 for k in _maxima(sizes)):
+                return found
+            if np.all(sizes <= 1) and self._stable_ends(place, found):
+                self._keep(near, place, found)
                 return found
         return self._searched_again(place, near, moved)
 
@@ -398,14 +398,16 @@ class OperatingRange(_AroundEdges):
         return self._through[key]
 
     def _between(self, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> tuple[np.ndarray, np.ndarray]:
-        """Speeds of the orbits between the edges, ascending, and the sizes of their largest multipliers."""
+        """Speeds of the orbits between the edges, ascending, and sizes of their largest multipliers, 1 at an edge."""
         if (through := self.through(place)) is None:
             return np.zeros(0), np.zeros(0)
         (low, high), lower, upper = self.wider, edges["lower"], edges["upper"]
         low = low if lower is None else max(low, lower.value_rpm / RPM)
         high = high if upper is None else min(high, upper.value_rpm / RPM)
         inside = (through.speeds > low * (1 + BESIDE)) & (through.speeds < high * (1 - BESIDE))
-        return through.speeds[inside], through.sizes[inside]
+        first, last = ([1.0] * (end not in self.wider) for end in (low, high))
+        speeds = [low] * len(first), through.speeds[inside], [high] * len(last)
+        return np.concatenate(speeds), np.concatenate([first, through.sizes[inside], last])
 
     def _stable_ends(self, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> bool:
         """Whether the orbits at the ends of the margins are stable, where the edges lie beyond them."""

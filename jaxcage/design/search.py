@@ -286,8 +286,9 @@ def _programme(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) 
 
     Each programme has the cost itself, where it is cheap, and the requirements linearised with their exact derivatives;
     SciPy's SLSQP solves it. Its step is one solution of the edges; a step that loses an edge is halved, and so is one
-    that gains less than a tenth of what was foreseen, once its linearised requirements have been added. What the worst requirement falls short is bought at a price that outweighs
-    the cost, so that the search leads to a feasible place or, where there is none, to the least shortfall.
+    that gains less than a tenth of what was foreseen, once its linearised requirements have been added. What the worst
+    requirement falls short is bought at a price that outweighs the cost, so that the search leads to a feasible place
+    or, where there is none, to the least shortfall.
     """
     trial, radius, largest = problem.at(begin), FIRST_RADIUS, LARGEST_RADIUS
     size, refused = max(abs(trial.cost), 1e-12), list[Trial]()
