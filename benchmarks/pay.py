@@ -29,10 +29,10 @@ from scipy.stats import qmc
 
 import jaxcage as jc
 from benchmarks.common import columns
-from jaxcage.design.operating import DesignSpace, OperatingRange
-from jaxcage.design.requirements import Requirements, cost_function, listed
-from jaxcage.design.search import KEPT, SEARCHES, CostProblem
-from jaxcage.design.surrogate import SurrogateSearch
+from jaxcage.design import SEARCHES, DesignSpace, OperatingRange, Requirements, SurrogateSearch, cost_function
+from jaxcage.design.operating import KEPT
+from jaxcage.design.requirements import listed
+from jaxcage.design.search import Problem
 from jaxcage.files import read_bearing
 from jaxcage.lanes import sobol
 
@@ -68,9 +68,9 @@ class Case:
         self.rest = listed(Requirements(), model), cost_function(None, model), np.ones(self.own.size, bool), {}
         self.cost = self.problem().at(self.own).cost
 
-    def problem(self) -> CostProblem:
+    def problem(self) -> Problem:
         """The problem, with the edges of the given design only."""
-        return CostProblem(copy.deepcopy(self.range), *self.rest)
+        return Problem(copy.deepcopy(self.range), *self.rest)
 
 
 class Ended(Exception):

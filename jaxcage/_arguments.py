@@ -37,28 +37,36 @@ def check_layer(layer: dict[str, Any], names: str) -> None:
 
 
 def checked(f: Callable[..., Any]) -> Callable[..., Any]:
-    """`f`, which compares its arguments with their annotations first; some of them may be missing.
-
-    **Raises:** `ArgumentError` for the first that is not what its annotation says.
-    """
-    signature = inspect.signature(f)
+    """`f`, which compares its arguments with their annotations first."""
 
     @functools.wraps(f)
     def run(*args: Any, **kwargs: Any) -> Any:
-        try:
-            given = signature.bind_partial(*args, **kwargs).arguments
-        except TypeError:
-            given = {}  # Python says it as it always does, where `f` is called
-        for name, value in given.items():
-            parameter = signature.parameters[name]
-            several = parameter.kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
-            if several or parameter.annotation is inspect.Parameter.empty:  # the latter is `self`
-                continue
-            if said := wrong(parameter.annotation, value):
-                raise ArgumentError(name, said=f"must be {said}, but {shown(value)} was given.")
+        check_call(f, *args, **kwargs)
         return f(*args, **kwargs)
 
     return run
+
+
+_signature = functools.lru_cache(maxsize=1024)(inspect.signature)
+
+
+def check_call(f: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
+    """Compare arguments with the annotations of `f`; some of them may be missing.
+
+    **Raises:** `ArgumentError` for the first that is not what its annotation says.
+    """
+    signature = _signature(f)
+    try:
+        given = signature.bind_partial(*args, **kwargs).arguments
+    except TypeError:
+        return  # Python says it as it always does, where `f` is called
+    for name, value in given.items():
+        parameter = signature.parameters[name]
+        several = parameter.kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+        if several or parameter.annotation is inspect.Parameter.empty:  # the latter is `self`
+            continue
+        if said := wrong(parameter.annotation, value):
+            raise ArgumentError(name, said=f"must be {said}, but {shown(value)} was given.")
 
 
 def is_concrete(*values: object) -> bool:

@@ -151,8 +151,7 @@ def independent(range_, quantity, value):
         end, sign = (range_.operating[0], -1) if quantity == "lower margin" else (range_.operating[1], 1)
         return lambda m: 100 * sign * (edge_speed(m, edge.kind, speed, edge.state / scale) / end - 1)
     through = range_.through(range_.space.place)
-    rise = np.argsort(through.value)
-    z = np.array([np.interp(speed, through.value[rise], c) for c in through.state[rise].T]) / scale
+    z = through.state(speed) / scale
     if quantity == "multiplier":
         return lambda m: np.max(np.abs(np.linalg.eigvals(orbit(m, speed, z)[1])))
     return lambda m: readings(m, speed, z)[quantity]
@@ -264,12 +263,20 @@ def test_the_least_width_of_an_unstable_range():
     assert abs(found.values["y"]) < 0.02 and found.cost == pytest.approx(30 / np.pi * 0.2, rel=5e-3)
 
 
+def test_an_unstable_range_that_is_born_stops_the_search_there():
+    """The largest multiplier between is exp(2 pi k (-d)/x) at x, and passes 1 where d = 0; no edge bounds the range."""
+    begin, reward = window(y=0.0, d=-0.2, k=-0.5), lambda system: 1 - system.rates.d
+    found = jc.design_for(begin, (0.8, 1.2), {"d": (-0.3, 0.3)}, KEEP, reward, check=0)
+    assert found.feasible and found.values["d"] == pytest.approx(0.0, abs=1e-3) and not found.notes
+    assert set(found.prices) == {"no unstable speeds between"}
+
+
 REFUSED = [
     (dict(operating=(2.0, 1.2)), "`operating` must be two positive speeds, ascending, but are 2 and 1.2"),
     (dict(vary={"z": (0.0, 1.0)}), "`z` must be a parameter of the design: x, y, d, k, s, r"),
     (dict(vary={"x": (1.0, 1.0)}), "Bounds of `x` must ascend, but 1.0 and 1.0 were given"),
     (dict(search="newton"), "`search` must be one of slsqp, augmented, but 'newton' was given"),
-    (dict(objective="noise"), "`objective` must be cost or width, but 'noise' was given"),
+    (dict(objective="noise"), "`objective` must be one of cost, width, but 'noise' was given"),
     (dict(cost={"z": Price(1.0, 1.0)}), "`cost` must name parameters of the design, but has 'z'"),
     (dict(tolerance={"x": Tolerance.balanced(2.5, 100.0)}), "`tolerance` gives the made range of x itself"),
     (dict(tolerance={"x": Tolerance(0.1, -0.1)}), "`tolerance` of x must have a lower end below its upper end"),

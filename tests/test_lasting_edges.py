@@ -74,9 +74,10 @@ class Planted:
     def __init__(self, seed: int, rate_at_edge: float = 1.0, steep: float = STEEP, curvature: float = 0.0):
         self.rng, self.rate, self.steep, self.curvature = np.random.default_rng(seed), rate_at_edge, steep, curvature
 
-    def __call__(self, model: Any, names: Any, values: np.ndarray, rpm: np.ndarray, horizon: int, *_: Any) -> Any:
-        base = np.array([float(jc.parameters(model)[n]) for n in names])
-        away = rpm - EDGE * np.prod((values / base) ** ELASTICITY, axis=1)
+    def __call__(self, designs: Any, rpm: np.ndarray, run: Any, _: Any) -> Any:
+        base, *values = (np.array([float(jc.parameters(m)[n]) for n in NAMES]) for m in (CASE, *designs))
+        horizon = run.horizon
+        away = rpm - EDGE * np.prod((np.array(values) / base) ** ELASTICITY, axis=1)
         beyond = self.steep * away
         rate = self.rate * np.exp(beyond + self.curvature * beyond**2) / horizon
         block = analysis.LIFE_BLOCK
@@ -100,11 +101,11 @@ def test_planted_edges_and_elasticities_lie_within_their_errors(planted, curvatu
     for seed in range(40):
         planted(seed, curvature=curvature)
         found = lasting_edge(CASE, 12100.0, 150.0, names=NAMES, seed=seed)
-        error = np.array([found.speed_rpm - EDGE, *(found.elasticity - ELASTICITY), found.sum_of(*NAMES)[0] - 0.2])
-        stated = np.array([found.standard_error_rpm, *found.elasticity_error, found.sum_of(*NAMES)[1]])
+        error = np.array([found.value - EDGE, *(found.elasticity - ELASTICITY), found.elasticity_of(*NAMES)[0] - 0.2])
+        stated = np.array([found.value_error, *found.elasticity_error, found.elasticity_of(*NAMES)[1]])
         inside += np.abs(error) < errors * stated
         steady += found.status == "converged"
-        assert found.standard_error_rpm < 30 and np.all(found.elasticity_error < 0.15)
+        assert found.value_error < 30 and np.all(found.elasticity_error < 0.15)
     assert np.all(inside >= most) and steady >= 36
 
 
@@ -123,10 +124,10 @@ def test_an_open_zone_has_no_width_and_the_gradient_of_its_one_edge(planted):
     for end, sign, missing in (("exit", 1.0, "onset"), ("onset", -1.0, "exit")):
         width = zone_width({f"zone 2 {end}": found}, 2)
         assert width.open and width.trusted and width.status == f"open: no {missing} within the range"
-        assert width.width_rpm is None and width.standard_error_rpm is None
+        assert np.isnan(width.value)
         by, error = width.change(*NAMES)
-        assert by == pytest.approx(sign * found.speed_rpm * found.sum_of(*NAMES)[0])
-        assert error == pytest.approx(found.speed_rpm * found.sum_of(*NAMES)[1])
+        assert by == pytest.approx(sign * found.value * found.elasticity_of(*NAMES)[0])
+        assert error == pytest.approx(found.value * found.elasticity_of(*NAMES)[1], rel=0.01)
     with pytest.raises(ValueError, match="`zone` must be one with an edge among zone 2 exit, but is 1"):
         zone_width({"zone 2 exit": found})
     with pytest.raises(ValueError, match="`names` must be among guidance_gap, eccentricity, but has 'gap'"):

@@ -68,13 +68,13 @@ def test_set_up_commands_are_those_of_the_check():
 
 
 def test_toml_of_the_pages_is_accepted(tmp_path: pathlib.Path):
-    from jaxcage.files import load_model, load_whole_bearing
+    from jaxcage.files import load_model
 
     blocks = re.findall(r"```toml\n(.*?)```", "\n".join(PAGES.values()), flags=re.S)
     cage, whole = sorted(blocks, key=lambda block: "nu2310" in block)
     path = tmp_path / "bearing.toml"
     path.write_text(whole)
-    assert float(load_whole_bearing(path).load) == 1000.0
+    assert float(load_model(path).load) == 1000.0
     path.write_text(cage)
     model = load_model(path)
     assert float(model.guidance_gap) == pytest.approx(0.5e-3)

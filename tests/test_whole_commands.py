@@ -10,7 +10,7 @@ from helpers import document, is_png, read_columns, refused
 
 import jaxcage as jc
 from jaxcage.design import Runs, mean_gradient
-from jaxcage.files import subject_of, whole_bearing_from
+from jaxcage.files import load_model, model_from
 from jaxcage.lanes import load, stored_configuration
 from jaxcage.show import read_operating
 
@@ -55,7 +55,7 @@ def test_sweep(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path, mine:
     np.testing.assert_allclose(stored["rpm"].values, [8000, 12000])
     assert stored["label"].values.tolist() == expected["label"].values.tolist()
     configured = stored_configuration(stored)
-    assert configured is not None and float(whole_bearing_from(configured).load) == 1000
+    assert configured is not None and float(model_from(configured).load) == 1000
 
 
 @pytest.mark.wide
@@ -132,7 +132,7 @@ def test_report(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
 def test_init(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     path = tmp_path / "mine.toml"
     assert json.dumps(document(capsys, "init", str(path), "--model", "bearing")) == json.dumps({"file": str(path)})
-    assert subject_of(path) == "bearing"
+    assert isinstance(load_model(path), jc.BearingModel)
     assert "takes a cage" in refused(capsys, "poincare", str(path), "--speed", "1e4")
 
 

@@ -179,8 +179,8 @@ def read_case(given: str) -> Subject:
     if given in cases:
         found = Subject(given, jc.case(given), cases[given])
     elif Path(given).suffix.lower() == ".toml" or os.path.exists(given):
-        read = jc.files.read_bearing if jc.files.subject_of(given) == "cage" else jc.files.read_whole_bearing
-        file, name = read(given), "".join(c if c.isprintable() and c != "$" else "_" for c in Path(given).stem)
+        file, name = jc.files.read_bearing(given), Path(given).stem
+        name = "".join(c if c.isprintable() and c != "$" else "_" for c in name)
         found = Subject(name, file.model, None, file, given)
     elif given.lower() in bearings:
         found = Subject(given.lower(), jc.whole_bearing(given))

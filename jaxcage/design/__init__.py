@@ -1,53 +1,46 @@
-"""Designs: calm operation by exact gradients; statistics of runs, slopes, shares of variance, unknown parameters.
+"""Designs: calm operation by exact gradients; statistics of runs, slopes, shares of variance, unknown values.
 
-| module           | responsibility                                                                          |
-|------------------|-----------------------------------------------------------------------------------------|
-| `search`         | the cheapest design that keeps its requirements over an operating range                 |
-| `requirements`   | limits that a design must keep, and what it costs                                       |
-| `operating`      | edges and orbits of an operating range, with exact derivatives by the design            |
-| `unstable_width` | width of unstable ranges as an objective                                                |
-| `tolerance`      | what manufacture makes of a design: worst corners, budgets                              |
-| `check`          | simulations of a design from many initial states                                        |
-| `surrogate`      | search for a better design by a Gaussian process                                        |
-| `statistics`     | chaotic speeds, quantities, loads of designs, read off one sweep; two designs compared  |
-| `loads`          | loads of the guiding land, size and whirl of the motion                                 |
-| `survival_edges` | edges of lasting chaos with their gradients, by survival regression; widths of zones    |
-| `paired_designs` | slopes of statistics by paired designs; tolerance budgets                               |
-| `variance`       | Sobol indices                                                                           |
-| `chances`        | chances of chaos of a cage that is known within ranges only                             |
-| `identification` | ranges narrowed by measurements                                                         |
+| module          | responsibility                                                                     |
+|-----------------|------------------------------------------------------------------------------------|
+| `design_space`  | a design with the parameters that may change and their bounds                      |
+| `requirements`  | limits that a design must keep, what it costs, tolerances of manufacture           |
+| `operating`     | edges and orbits of an operating range, with exact derivatives by the design       |
+| `search`        | the cheapest design that keeps its requirements over an operating range            |
+| `check`         | simulations of a design from many initial states                                   |
+| `statistics`    | chaotic speeds, quantities, loads of designs, read off one sweep; designs compared |
+| `loads`         | loads of the guiding land, size and whirl of the motion                            |
+| `slopes`        | slopes of statistics by paired designs; tolerance budgets                          |
+| `survival_edges`| edges of lasting chaos with slopes by survival regression; widths of zones         |
+| `variance`      | Sobol indices                                                                      |
+| `surrogate`     | search for a better design by a Gaussian process                                   |
+| `unknowns`      | chances of chaos of a cage known within ranges; ranges narrowed by measurements    |
 """
 
 from .._arguments import check_layer
-from .chances import (
-    REVOLUTIONS as REVOLUTIONS,
-    Clue as Clue,
-    Ensemble as Ensemble,
-    binomial_interval as binomial_interval,
-    ensemble as ensemble,
-    verdict_of as verdict_of,
-)
 from .check import Checked as Checked, check_design as check_design
-from .identification import Narrowed as Narrowed, misses as misses, narrow as narrow
+from .design_space import DesignSpace as DesignSpace, Value as Value
 from .loads import LAND_LOADS as LAND_LOADS, land_loads as land_loads, motions as motions
-from .operating import DesignSpace as DesignSpace, OperatingRange as OperatingRange, Value as Value
-from .paired_designs import (
+from .operating import OperatingRange as OperatingRange, UnstableWidth as UnstableWidth
+from .requirements import (
+    COSTS as COSTS,
+    Budget as Budget,
+    Price as Price,
+    Requirement as Requirement,
+    Requirements as Requirements,
+    Tolerance as Tolerance,
+    cost_function as cost_function,
+)
+from .search import SEARCHES as SEARCHES, Design as Design, Trial as Trial, design_for as design_for
+from .slopes import (
     DIRECTIONS as DIRECTIONS,
     MeanGradient as MeanGradient,
+    Slopes as Slopes,
     StatisticGradient as StatisticGradient,
     ToleranceBudget as ToleranceBudget,
     gradient_of_pairs as gradient_of_pairs,
     mean_gradient as mean_gradient,
     tolerance_budget as tolerance_budget,
 )
-from .requirements import (
-    COSTS as COSTS,
-    Price as Price,
-    Requirement as Requirement,
-    Requirements as Requirements,
-    cost_function as cost_function,
-)
-from .search import SEARCHES as SEARCHES, Design as Design, Trial as Trial, design_for as design_for
 from .statistics import (
     BALANCE as BALANCE,
     BEARING_MEASURES as BEARING_MEASURES,
@@ -73,8 +66,17 @@ from .survival_edges import (
     lasting_edges as lasting_edges,
     zone_width as zone_width,
 )
-from .tolerance import Budget as Budget, Tolerance as Tolerance
-from .unstable_width import UnstableWidth as UnstableWidth
+from .unknowns import (
+    REVOLUTIONS as REVOLUTIONS,
+    Clue as Clue,
+    Ensemble as Ensemble,
+    Narrowed as Narrowed,
+    binomial_interval as binomial_interval,
+    ensemble as ensemble,
+    misses as misses,
+    narrow as narrow,
+    verdict_of as verdict_of,
+)
 from .variance import SobolIndices as SobolIndices, global_sensitivity as global_sensitivity
 
 

@@ -18,11 +18,9 @@ SPEEDS = 24  # of the check
 
 @dataclasses.dataclass(frozen=True)
 class Checked:
-    """Where simulations of a design ended, over speeds [rpm] of its operating range.
-
-    `shares` are those of the lanes by label; `chaotic_rpm` the speeds at which chaos coexists with the calm orbit and
-    `mean_life` how many revolutions it lasts there in the mean, infinite where none ended.
-    """
+    """Where simulations of a design ended, over speeds [rpm] of its operating range: shares of the lanes by label, the
+    speeds at which chaos coexists with the calm orbit, and how many revolutions it lasts there in the mean, infinite
+    where none ended."""
 
     speeds_rpm: Float[np.ndarray, " speeds"]
     starts: int
@@ -33,25 +31,18 @@ class Checked:
     method: str
 
     @property
-    def calm_share(self) -> float:
-        """Share of the lanes that ended on a period-1 orbit."""
-        return self.shares.get("periodic-1", 0.0)
-
-    @property
     def calm(self) -> bool:
         """Whether all lanes ended on a period-1 orbit."""
-        return self.calm_share == 1.0
+        return self.shares.get("periodic-1") == 1.0
 
     def __str__(self) -> str:
-        said = (
-            f"{100 * self.calm_share:.1f} % of {self.starts} initial states at {self.speeds_rpm.size} speeds end calm"
-        )
+        share = 100 * self.shares.get("periodic-1", 0.0)
+        said = f"{share:.1f} % of {self.starts} initial states at {self.speeds_rpm.size} speeds end calm"
         if not self.chaotic_rpm.size:
             return said
         low, high = f"{self.chaotic_rpm.min():.0f}", f"{self.chaotic_rpm.max():.0f} rpm of the cage"
-        lasts = " to ".join(
-            f"{x:.0f}" if np.isfinite(x) else "no end seen" for x in (self.mean_life.min(), self.mean_life.max())
-        )
+        ends = self.mean_life.min(), self.mean_life.max()
+        lasts = " to ".join(f"{x:.0f}" if np.isfinite(x) else "no end seen" for x in ends)
         where = f"at {self.chaotic_rpm.size} of the speeds, {low} to {high}"
         return f"{said}; chaos coexists {where}, with a mean life of {lasts} revolutions"
 
@@ -72,14 +63,8 @@ def check_design(
     told = (lambda done, of: progress("check", done, of)) if progress else None
     found = sweep(model, speeds, starts=states, progress=told)
     labels, counts = np.unique(found["label"].values, return_counts=True)
-    lost = int(np.sum(failed(found)))
-    where = np.flatnonzero(restless(found))
-    return Checked(
-        speeds * 30 / np.pi,
-        states.shape[1],
-        dict(zip(labels.tolist(), (counts / counts.sum()).tolist(), strict=True)),
-        lost,
-        speeds[where] * 30 / np.pi,
-        np.array([survival_at(found, int(i)).mean_life for i in where]),
-        json.loads(found.attrs["settings"])["method"],
-    )
+    shares = dict(zip(labels.tolist(), (counts / counts.sum()).tolist(), strict=True))
+    rpm, where = speeds * 30 / np.pi, np.flatnonzero(restless(found))
+    lives = np.array([survival_at(found, int(i)).mean_life for i in where])
+    method = json.loads(found.attrs["settings"])["method"]
+    return Checked(rpm, states.shape[1], shares, int(np.sum(failed(found))), rpm[where], lives, method)

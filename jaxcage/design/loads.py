@@ -6,15 +6,13 @@ for every design; a design changes the mean of N times the sliding speed.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
-from jaxtyping import Array, Complex, Float
+from jaxtyping import Array, Bool, Complex, Float
 
-from .._pytrees import Form, compiled
 from ..analysis import OrderSpectrum, dominant_orders
 from ..models import CageModel
 from ..solve import REVOLUTION, AbstractMethod, Lanes, histories, native
@@ -27,22 +25,25 @@ revolutions, mean power to shear the film, and the smallest distance of cage and
 SAMPLES, REVOLUTIONS = 512, 4
 """Phases of a revolution at which loads are read, and revolutions. A blow on the land lasts for some hundredths of a
 radian: its peak is read up to 5 % too low (case 1b at 9000 and 27500 rpm beside 4096 phases), its impulse to 0.5 %."""
-CHUNK = 64
-"""Lanes whose loads are read at a time."""
 MOTION_SAMPLES, MOTION_REVOLUTIONS = 32, 32
 """The same of the motion: the size of a circle at cage frequency is read up to 0.5 % too small, that of one at the
 fourth order up to 8 %; orders are resolved to 1/32, and interpolated between."""
 
 
-def _ended(
-    models: CageModel | Sequence[CageModel], found: xr.Dataset
-) -> tuple[Lanes, Float[np.ndarray, "lanes dim"], Sequence[CageModel], np.ndarray]:
-    """Lanes of a sweep, their last states, the designs, and the number of the design of each lane."""
-    last, designs = found["last"], models if isinstance(models, Sequence) else [models]
+Designs = CageModel | Sequence[CageModel]
+
+
+def _seen(
+    models: Designs, found: xr.Dataset, samples: int, revolutions: int, method: AbstractMethod | None
+) -> tuple[Lanes, Float[np.ndarray, "lanes samples dim"], Bool[np.ndarray, " lanes"]]:
+    """Lanes that go on from the end of a sweep, their states at each phase, and whether these are known."""
+    last, several = found["last"], isinstance(models, Sequence)
     place = np.indices(last.shape[:-1]).reshape(last.ndim - 1, -1)
-    which = place[0] if isinstance(models, Sequence) else np.zeros(place.shape[1], dtype=int)
-    lanes = Lanes.of(designs, found["speed"].values[place[-2]], which)
-    return lanes, last.values.reshape(-1, last.shape[-1]), designs, which
+    which = place[0] if several else np.zeros(place.shape[1], dtype=int)
+    lanes = Lanes.of(models if isinstance(models, Sequence) else [models], found["speed"].values[place[-2]], which)
+    chosen = native() if method is None else method
+    seen, error = histories(lanes, last.values.reshape(-1, last.shape[-1]), samples, revolutions, chosen)
+    return lanes, seen, error <= chosen.allowed
 
 
 def land_reading(model: CageModel, speed: Array, tau: Array, y: Array) -> Float[Array, "3"]:
@@ -59,54 +60,41 @@ def land_reading(model: CageModel, speed: Array, tau: Array, y: Array) -> Float[
     return jnp.stack([force, -forces["film"][2] * speed, jnp.hypot(*q)])
 
 
-@compiled
-def _read(form: Form, several: bool, speed: Array, rows: Any, states: Array) -> Float[Array, "lanes n 3"]:
-    """Readings of the land at each sample."""
-    tau = jnp.arange(states.shape[1], dtype=float) * (REVOLUTION / SAMPLES)
-
-    def lane(speed: Array, row: Any, states: Array) -> Array:
-        return jax.vmap(lambda tau, y: land_reading(form.filled(row), speed, tau, y))(tau, states)
-
-    return jax.vmap(lane, in_axes=(0, 0 if several else None, 0))(speed, rows, states)
+def _loads(model: CageModel, speed: Array, states: Array) -> Float[Array, "4"]:
+    """`LAND_LOADS` of a lane."""
+    tau = jnp.arange(states.shape[0], dtype=float) * (REVOLUTION / SAMPLES)
+    force, power, away = jax.vmap(lambda tau, y: land_reading(model, speed, tau, y))(tau, states).T
+    film = jnp.maximum(model.clearance - jnp.max(away), 0.0)
+    return jnp.stack([jnp.mean(force) * speed * model.land_radius, jnp.max(force), jnp.mean(power), film])
 
 
 def land_loads(
-    models: CageModel | Sequence[CageModel], found: xr.Dataset, method: AbstractMethod | None = None
+    models: Designs, found: xr.Dataset, method: AbstractMethod | None = None
 ) -> dict[str, Float[np.ndarray, "*lanes"]]:
     """Loads of the land (`LAND_LOADS`) in each lane of a sweep; NaN where a lane is not known to the method's error.
 
     **Arguments:** model or designs, and their sweep; integration method, by default `jaxcage.native()`.
     """
-    chosen, (lanes, last, designs, which) = native() if method is None else method, _ended(models, found)
-    mean, largest = np.empty((2, len(last), 3))
-    for first in range(0, len(last), CHUNK):
-        some = np.arange(first, min(first + CHUNK, len(last)))
-        seen, error = histories(lanes.at(some), last[some], SAMPLES, REVOLUTIONS, chosen)
-        rows = [jnp.asarray(x) for x in lanes.rows(some)]
-        values = _read(lanes.form, lanes.several, jnp.asarray(lanes.speed[some]), rows, jnp.asarray(seen))
-        values = np.where((error <= chosen.allowed)[:, None, None], values, np.nan)
-        mean[some], largest[some] = values.mean(axis=1), values.max(axis=1)
-    radius, clearance = np.array([(float(m.land_radius), float(m.clearance)) for m in designs])[which].T
-    wear, film = mean[:, 0] * lanes.speed * radius, np.maximum(clearance - largest[:, 2], 0.0)
-    each = zip(LAND_LOADS, (wear, largest[:, 0], mean[:, 1], film), strict=True)
-    return {name: x.reshape(found["last"].shape[:-1]) for name, x in each}
+    lanes, seen, known = _seen(models, found, SAMPLES, REVOLUTIONS, method)
+    loads = lanes.each(_loads, np.arange(len(seen)), seen)
+    each = np.where(known[:, None], loads, np.nan).T.reshape(len(LAND_LOADS), *found["last"].shape[:-1])
+    return dict(zip(LAND_LOADS, each, strict=True))
 
 
 def motions(
-    models: CageModel | Sequence[CageModel], found: xr.Dataset, method: AbstractMethod | None = None
+    models: Designs, found: xr.Dataset, method: AbstractMethod | None = None
 ) -> tuple[Float[np.ndarray, "*lanes"], Float[np.ndarray, "*lanes"]]:
     """Size and whirl of the motion of the cage centre relative to its rib, in each lane of a sweep.
 
-    **Arguments:** model or designs, and their sweep; integration method, by default `jaxcage.native()`.
+    **Arguments:** as `land_loads`.
 
     **Returns:** size [m] from one end to the other, as a probe reads it, the larger of horizontal and vertical; order
     of the largest line in the spectrum of x + i y, a multiple of the cage speed, negative where it whirls against the
     rotation, NaN where the centre stands still. Both are NaN where a lane is not known to the method's error.
     """
-    chosen, (lanes, last, *_) = native() if method is None else method, _ended(models, found)
-    seen, error = histories(lanes, last, MOTION_SAMPLES, MOTION_REVOLUTIONS, chosen)
-    state = np.where((error <= chosen.allowed)[:, None, None], seen, np.nan)
-    q = state[..., :2] if last.shape[1] == 4 else state[..., :2] - state[..., 2:4]
+    _, seen, known = _seen(models, found, MOTION_SAMPLES, MOTION_REVOLUTIONS, method)
+    state = np.where(known[:, None, None], seen, np.nan)
+    q = state[..., :2] if state.shape[2] == 4 else state[..., :2] - state[..., 2:4]
     order = np.array([_order(x + 1j * y) for x, y in np.moveaxis(q, 2, 1)])
     return np.ptp(q, axis=1).max(axis=1).reshape(found["label"].shape), order.reshape(found["label"].shape)
 

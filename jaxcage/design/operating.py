@@ -1,16 +1,16 @@
-"""What a design does over its operating range, with exact derivatives by the design.
+"""What a design does over a range of speed, with exact derivatives by the design.
 
 The range is calm where the synchronous orbit is stable. Edges of that stable range are bifurcations, which are followed
-from design to design; the orbits between are followed through the operating range, and of what they do the worst counts
-wherever it is. A worst value moves with the design as it does at its own speed, which is held (the envelope theorem).
+from the nearest design at which they are known. The orbits between are followed through the operating range, and of
+what they do the worst counts, at whatever speed. A worst value moves with the design as it does at its own speed, which
+is held (the envelope theorem).
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -18,11 +18,8 @@ from jaxtyping import Array, Float
 from scipy.optimize import minimize_scalar
 
 from .._errors import InputError
-from .._parameters import parameters, replace
 from .._pytrees import compiled
-from ..models import AbstractForcedSystem
 from ..orbits import (
-    Branch,
     Followed,
     Orbit,
     Point,
@@ -30,13 +27,16 @@ from ..orbits import (
     StableRange,
     branch,
     follow_all,
+    loss_zones,
     orbit_slopes,
     periodic_orbit,
     stable_range,
+    synchronous_orbits,
 )
 from ..solve import REVOLUTION, AbstractMethod, FixedSteps, strobe_map
+from .design_space import DesignSpace, Value
 from .loads import land_reading
-from .surrogate import Bounds, checked_bounds
+from .requirements import Requirement, balance_grade
 
 
 PARTS = 4096
@@ -50,72 +50,17 @@ FAR = 0.1  # an orbit moves by less from design to design, in units of the scale
 BESIDE = 1e-3  # orbits nearer to an edge are not looked at, relative
 PEAKING = 0.8  # smaller multipliers are no concern
 WORST_AT = 1e-4  # accuracy of the speed of a worst value, relative
+KEPT = 1e-3  # slack, negative, at which a requirement still counts as kept
+RPM = 30 / np.pi
+READ = "land force", "drag", "film"
 
 
-class Value(NamedTuple):
-    """A number that a design is judged by, its derivatives by the place in the design space, and the cage speed [rpm]
-    to which it belongs."""
-
-    value: float
-    slope: Float[np.ndarray, " n"]
-    rpm: float = float("nan")
-
-
-class DesignSpace(eqx.Module):
-    """A design, the parameters that may change, and their bounds: a function from a place between the bounds, 0 to 1 in
-    each parameter, to the design there, which JAX differentiates."""
-
-    system: AbstractForcedSystem
-    lower: Float[np.ndarray, " n"]
-    """Smallest values [SI]."""
-    span: Float[np.ndarray, " n"]
-    """Distances of the bounds [SI]."""
-    names: tuple[str, ...] = eqx.field(static=True)
-
-    @classmethod
-    def of(cls, system: AbstractForcedSystem, vary: Bounds) -> "DesignSpace":
-        """The space within bounds. **Raises:** `ValueError` for bounds that make no sense."""
-        checked_bounds(system, vary)
-        low, high = np.array(list(vary.values()), dtype=float).T
-        return cls(system, low, high - low, tuple(vary))
-
-    @property
-    def place(self) -> Float[np.ndarray, " n"]:
-        """Place of the design itself."""
-        known = parameters(self.system)
-        return (np.array([float(known[name]) for name in self.names]) - self.lower) / self.span
-
-    def values(self, place: Float[np.ndarray, " n"]) -> dict[str, float]:
-        """Parameters [SI] at a place."""
-        return dict(zip(self.names, (self.lower + place * self.span).tolist(), strict=True))
-
-    def model(self, place: Float[np.ndarray, " n"]) -> AbstractForcedSystem:
-        """The design at a place."""
-        return replace(self.system, **self.values(place))
-
-    def slope_of(self, derivative: Mapping[str, float]) -> Float[np.ndarray, " n"]:
-        """Derivatives by the place, from derivatives by the parameters [SI]."""
-        return np.array([derivative[name] for name in self.names]) * self.span
-
-    def __call__(self, place: Float[Array, " n"]) -> AbstractForcedSystem:
-        values = self.lower + place * self.span
-        return replace(self.system, **{name: values[i] for i, name in enumerate(self.names)})
-
-
-@compiled
-def function_value(function: Callable[[Any], Any], designs: DesignSpace, place: Array) -> tuple[Array, Array]:
-    """Return a function of the design and its derivatives by the place."""
-    f = lambda x: jnp.asarray(function(designs(x)), dtype=float)
-    slope, value = jax.jacfwd(lambda x: (f(x),) * 2, has_aux=True)(place)
-    return value, slope
-
-
-# --- readings along an orbit ---------------------------------------------------------------------------------------
+# --- orbits through a range -----------------------------------------------------------------------------------------
 
 
 def _readings(system: Any, speed: Array, state: Array, method: AbstractMethod) -> Float[Array, "3"]:
-    """Return the largest land force [N], the mean power to shear the film [W] and the largest distance of the cage from
-    the middle [m] over a revolution from a state; largest values are read between the samples, by a parabola."""
+    """Return the largest land force [N], the mean power to shear the film [W] and minus the least distance of cage and
+    land [m] over a revolution from a state; largest values are read between the samples, by a parabola."""
     strobe = strobe_map(system, speed, method)
 
     def part(i: Array, carry: tuple) -> tuple:
@@ -131,7 +76,7 @@ def _readings(system: Any, speed: Array, state: Array, method: AbstractMethod) -
     before, here, after = (peaking[(top + k) % PARTS, jnp.arange(2)] for k in (-1, 0, 1))
     bend = before - 2 * here + after
     highest = here - jnp.where(bend < 0, (after - before) ** 2 / (8 * jnp.where(bend < 0, bend, 1.0)), 0.0)
-    return jnp.stack([highest[0], jnp.mean(seen[:, 1]), highest[1]])
+    return jnp.stack([highest[0], jnp.mean(seen[:, 1]), highest[1] - system.clearance])
 
 
 @compiled
@@ -148,55 +93,200 @@ def _read_moved(
     return jax.jacfwd(at)(place)
 
 
-# --- the range ------------------------------------------------------------------------------------------------------
+class Through(NamedTuple):
+    """Orbits through a range of speed at one place of the design space, by ascending speed: speeds [rad/s], states [SI]
+    and sizes of the largest multipliers."""
+
+    space: DesignSpace
+    place: Float[np.ndarray, " n"]
+    speeds: Float[np.ndarray, " orbits"]
+    states: Float[np.ndarray, "orbits dim"]
+    sizes: Float[np.ndarray, " orbits"]
+
+    @classmethod
+    def of(cls, space: DesignSpace, place: Float[np.ndarray, " n"], orbit: Orbit, low: float, high: float) -> "Through":
+        """The orbits between two speeds by continuation of one of them, as far as the speed rises or falls throughout:
+        past a fold there are other orbits at the same speeds."""
+        found = branch(space.model(place), orbit, lower=low, upper=high)
+        speed, state = float(orbit.speed), np.asarray(orbit.state)
+        away = np.abs(found.speed / speed - 1) + np.linalg.norm(found.state - state, axis=1) / np.linalg.norm(state)
+        rises = np.diff(found.speed) > 0
+        here = min(int(np.argmin(away)), rises.size - 1)
+        turns = np.flatnonzero(rises != rises[here])
+        first = int(np.max(turns[turns < here], initial=-1)) + 1
+        last = int(np.min(turns[turns > here], initial=rises.size)) + 1
+        some = first + np.argsort(found.value[first:last])
+        sizes = np.abs(found.multipliers[some]).max(axis=1)
+        return cls(space, place, found.value[some], found.state[some], sizes)
+
+    def state(self, speed: float) -> Float[np.ndarray, " dim"]:
+        """State near the orbit at a speed."""
+        return np.array([np.interp(speed, self.speeds, c) for c in self.states.T])
+
+    def orbit(self, speed: float) -> Orbit:
+        """The orbit at a speed."""
+        return periodic_orbit(self.space.model(self.place), speed, guess=self.state(speed))
+
+    def size(self, orbit: Orbit, name: str, speed: float | None = None) -> float:
+        """How bad an orbit is, or that of another speed, by the method of this one with a step at least from one phase
+        to the next."""
+        if speed is None and not bool(orbit.converged):
+            return -np.inf
+        if name == "multiplier":
+            return float(np.abs(orbit.multipliers[0]))
+        at = (orbit.speed, orbit.state) if speed is None else (speed, self.state(speed))
+        place, *at = jnp.asarray(self.place), *(jnp.asarray(x, dtype=float) for x in at)
+        return float(_read(self.space, place, *at, _reader(orbit))[READ.index(name)])
+
+    def value(self, orbit: Orbit, name: str) -> Value:
+        """A value of an orbit with its derivatives."""
+        moves, rpm = orbit_slopes(self.space, self.place, orbit), float(orbit.speed) * RPM
+        if name == "multiplier":
+            return Value(moves.multiplier, moves.multiplier_slope, rpm)
+        at = jnp.asarray(self.place), orbit.speed, orbit.state, jnp.asarray(moves.state_slope)
+        slope = np.asarray(_read_moved(self.space, *at, _reader(orbit))[READ.index(name)])
+        sign = -1.0 if name == "film" else 1.0
+        return Value(sign * self.size(orbit, name), sign * slope, rpm)
+
+    def largest(self, name: str, low: float, high: float) -> Orbit:
+        """The orbit between two speeds at which a quantity is largest, its speed to `WORST_AT`."""
+        minus = lambda speed: -float(np.nan_to_num(self.size(self.orbit(float(speed)), name), neginf=0.0))
+        found = minimize_scalar(minus, bounds=(low, high), method="bounded", options={"xatol": WORST_AT * high})
+        return self.orbit(float(found.x))
+
+    def worst(self, name: str, low: float, high: float) -> Value:
+        """A value where it is worst between two speeds."""
+        inner = (self.speeds > low) & (self.speeds < high)
+        ends = [self.orbit(low), self.orbit(high)]
+        by_branch = self.sizes[inner]
+        if name != "multiplier":
+            by_branch = [self.size(ends[0], name, speed) for speed in self.speeds[inner].tolist()]
+        first, last = (self.size(orbit, name) for orbit in ends)
+        speeds, sizes = np.array([low, *self.speeds[inner], high]), np.array([first, *by_branch, last])
+        near_top = [k for k in _maxima(sizes) if sizes[k] >= sizes.max() - RIVAL * np.ptp(sizes)]
+        orbits = [*ends, *(self.largest(name, speeds[k - 1], speeds[k + 1]) for k in near_top)]
+        return self.value(max(orbits, key=lambda orbit: self.size(orbit, name)), name)
+
+
+def _maxima(sizes: np.ndarray) -> list[int]:
+    """Places of the local maxima within a row of numbers."""
+    return [k for k in range(1, sizes.size - 1) if sizes[k - 1] < sizes[k] >= sizes[k + 1]]
+
+
+def _reader(orbit: Orbit) -> AbstractMethod:
+    method: Any = orbit.method
+    return FixedSteps(method.solver, jnp.asarray(PARTS * -(-int(orbit.steps) // PARTS)))
+
+
+# --- edges ----------------------------------------------------------------------------------------------------------
 
 
 class _Anchor(NamedTuple):
-    """A design at which the edges of the stable range are known, and one of its orbits."""
+    """A design at which edges are known; of a stable range also one of its orbits, over the scale, and its speed."""
 
     place: Float[np.ndarray, " n"]
-    edges: dict[str, Point | None]
-    state: Float[np.ndarray, " dim"]
-    """Over the scale of the state."""
-    speed: float
+    edges: Mapping[str, Point | None]
+    state: Any = None
+    speed: float = float("nan")
 
 
 @dataclasses.dataclass
-class OperatingRange:
-    """The edges and orbits of designs around an operating range, and what they are worth.
-
-    Edges and orbits are followed from the nearest design at which they are known. An edge that ends on the way, or past
-    which the orbit was unstable already, is replaced by the one that bounds the stable range now; `handed_over` says
-    so in words.
-    """
+class _AroundEdges:
+    """Edges around a range of cage speed [rad/s], followed from the nearest design at which they are known."""
 
     space: DesignSpace
     operating: tuple[float, float]
-    """Ends of the range of cage speed [rad/s]."""
-    margin: float = 0.0
-    """Per cent of speed beyond both ends over which orbits are followed as well."""
-    method: AbstractMethod | None = None
 
     def __post_init__(self):
         low, high = self.operating
         self.limits = REACH[0] * low, REACH[1] * high
-        self.wider = (1 - self.margin / 100) * low, (1 + self.margin / 100) * high
-        self._through: dict[bytes, Branch | None] = {}
         self.handed_over = list[str]()
-        found = stable_range(self.space.system, self.operating, self.limits, method=self.method)
+        self._anchors = [self._first()]
+
+    def _first(self) -> _Anchor:
+        """The edges of the given design. **Raises:** `InputError` if there are none."""
+        raise NotImplementedError
+
+    def _nearest(self, place: np.ndarray) -> _Anchor:
+        return min(self._anchors, key=lambda a: float(np.sum((a.place - place) ** 2)))
+
+    def _followed(self, near: _Anchor, place: np.ndarray) -> dict[str, Followed]:
+        """What became of the edges that an anchor has, at a place."""
+        known = {name: point for name, point in near.edges.items() if point is not None}
+        return follow_all(self.space.model(near.place), known, self.space.model(place), self.limits)
+
+    def _keep(self, near: _Anchor, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> None:
+        """Follow edges from this place, too."""
+        at = lambda edge: Point(edge.kind, edge.value_rpm / RPM, np.asarray(edge.state), steps=edge.steps)
+        points = {name: None if edge is None else at(edge) for name, edge in edges.items()}
+        self._anchors.append(near._replace(place=place.copy(), edges=points))
+
+
+@dataclasses.dataclass
+class UnstableWidth(_AroundEdges):
+    """The sum of the widths of unstable ranges [rpm], cut at the ends of a range of speed, and its exact derivatives.
+
+    The edges are those that a search finds at the first design. Two edges of one range that meet leave none of it.
+    """
+
+    def _first(self) -> _Anchor:
+        found = loss_zones(synchronous_orbits(self.space.system, *self.operating))
+        if not found.edges:
+            raise InputError("The range of speed must have an edge of an unstable range within it, but has none.")
+        return _Anchor(self.space.place, found.edges)
+
+    def values(self, place: Float[np.ndarray, " n"], wanted: Sequence[Requirement]) -> dict[str, Value] | str:
+        """`width` and, if wanted, `balance` at a place of the design space; or why they are not known."""
+        near = self._nearest(place)
+        found = self._followed(near, place)
+        low, high = (end * RPM for end in self.operating)
+        total, slope = 0.0, np.zeros(len(self.space.names))
+        for zone in sorted({name.rsplit(" ", 1)[0] for name in near.edges}):
+            both = {end: found.get(f"{zone} {end}") for end in ("onset", "exit")}
+            if all(f is not None and f.ended == "turned back" for f in both.values()):
+                continue
+            for (end, f), sign, at in zip(both.items(), (-1.0, 1.0), (low, high), strict=True):
+                if f is not None and f.edge is None:
+                    return f"{zone} {end}: {f.ended}"
+                if f is not None and f.edge is not None and low < (at := f.edge.value_rpm) < high:
+                    slope = slope + sign * self.space.slope_of(f.edge.derivative)
+                total += sign * float(np.clip(at, low, high))
+        if all(f.edge is not None for f in found.values()):
+            self._keep(near, place, {name: f.edge for name, f in found.items()})
+        width = {"width": Value(total, slope)}
+        graded = any(r.of == "balance" for r in wanted)
+        return width | ({"balance": balance_grade(self.space, self.operating, place)} if graded else {})
+
+
+@dataclasses.dataclass
+class OperatingRange(_AroundEdges):
+    """The edges and orbits of designs around an operating range, and what they are worth.
+
+    An edge that ends on the way from design to design, or past which the orbit was unstable already, is replaced by the
+    one that bounds the stable range now; `handed_over` says so in words. Orbits are followed over a `margin` beyond
+    both ends as well, per cent of their speeds.
+    """
+
+    margin: float = 0.0
+
+    def _first(self) -> _Anchor:
+        (low, high), part = self.operating, self.margin / 100
+        self.wider = (1 - part) * low, (1 + part) * high
+        self._through: dict[bytes, Through | None] = {}
+        found = stable_range(self.space.system, self.operating, self.limits)
         if found is None:
             raise InputError(
-                f"The cage must have a stable orbit somewhere in its operating range, {low * 30 / np.pi:.0f} to "
-                f"{high * 30 / np.pi:.0f} rpm of the cage, but none was found."
+                f"The cage must have a stable orbit somewhere in its operating range, {low * RPM:.0f} to "
+                f"{high * RPM:.0f} rpm of the cage, but none was found."
             )
-        self._anchors = [self._anchor(self.space.place, found)]
+        return self._anchor(self.space.place, found)
 
     def _anchor(self, place: np.ndarray, found: StableRange) -> _Anchor:
         """The anchor at a place with its stable range. **Raises:** `InputError` for an end that is no bifurcation."""
         for point, end, limit in zip((found.lower, found.upper), found.ends, self.limits):
             if point is None and abs(end - limit) > 1e-6 * limit:
                 raise InputError(
-                    f"The stable range ends near {end * 30 / np.pi:.0f} rpm of the cage and no bifurcation is found "
+                    f"The stable range ends near {end * RPM:.0f} rpm of the cage and no bifurcation is found "
                     "there: it must have exact edges to be designed by them (`search` `surrogate` needs none)."
                 )
         (first, last), (low, high) = found.ends, self.operating
@@ -208,33 +298,29 @@ class OperatingRange:
     def _scale(self, place: np.ndarray, speed: float) -> np.ndarray:
         return np.array([float(c) for c in self.space.model(place).scale(speed)])
 
-    def _nearest(self, place: np.ndarray) -> _Anchor:
-        return min(self._anchors, key=lambda a: float(np.sum((a.place - place) ** 2)))
-
-    def forget(self, place: Float[np.ndarray, " n"]) -> None:
-        """Follow nothing from this place any more."""
-        self._anchors = [a for a in self._anchors if not np.array_equal(a.place, place)]
-
     def edges(self, place: Float[np.ndarray, " n"]) -> dict[str, Sensitivity | None] | str:
-        """The edges of the stable range, `lower` and `upper`, None where it is open; or why there are none."""
-        near, model = self._nearest(place), self.space.model(place)
-        known = {name: point for name, point in near.edges.items() if point is not None}
-        edges = follow_all(self.space.model(near.place), known, model, self.limits, self.method)
-        found: dict[str, Sensitivity | None] = {name: None for name in near.edges}
-        found |= {name: f.edge for name, f in edges.items()}
-        if all(f.edge is not None and f.edge.bounds for f in edges.values()) and self._stable_between(place, found):
-            points = {name: edge and point_of(edge, near.edges[name]) for name, edge in found.items()}
-            self._anchors.append(near._replace(place=place.copy(), edges=points))
-            return found
-        return self._searched_again(place, near, edges)
+        """The edges of the stable range, `lower` and `upper`, None where it is open; or why there are none.
+
+        They stay if an unstable range is born between them: `peak` is above 1 there, and its slope leads back.
+        """
+        near = self._nearest(place)
+        moved = self._followed(near, place)
+        found = dict.fromkeys(near.edges) | {name: f.edge for name, f in moved.items()}
+        if all(f.edge is not None and f.edge.bounds for f in moved.values()):
+            sizes = self._between(place, found)[1]
+            if any(sizes[k] >= 1 for k in _maxima(sizes)):
+                return found
+            if np.all(sizes <= 1) and self._stable_ends(place, found):
+                self._keep(near, place, found)
+                return found
+        return self._searched_again(place, near, moved)
 
     def _searched_again(
-        self, place: np.ndarray, near: _Anchor, edges: Mapping[str, Followed]
+        self, place: np.ndarray, near: _Anchor, moved: Mapping[str, Followed]
     ) -> dict[str, Sensitivity | None] | str:
         """The edges that bound the stable range now, by a search from its orbit."""
-        model = self.space.model(place)
         guess = (near.state * self._scale(place, near.speed), near.speed)
-        search = partial(stable_range, model, self.operating, self.limits, method=self.method)
+        search = partial(stable_range, self.space.model(place), self.operating, self.limits)
         found = search([guess]) or search()
         if found is None:
             return "no stable orbit in the operating range"
@@ -242,34 +328,50 @@ class OperatingRange:
             anchor = self._anchor(place, found)
         except InputError as error:
             return str(error)
-        known = {name: point for name, point in anchor.edges.items() if point is not None}
-        solved = {name: f.edge for name, f in follow_all(model, known, model, self.limits, self.method).items()}
+        solved = {name: f.edge for name, f in self._followed(anchor, place).items()}
         if lost := [name for name, edge in solved.items() if edge is None]:
             return f"the {' and '.join(lost)} edge is not located"
         self._anchors.append(anchor)
         for name in anchor.edges:
-            old, now = edges[name].edge if name in edges else None, solved.get(name)
+            old, now = moved[name].edge if name in moved else None, solved.get(name)
             if old is None or now is None or abs(old.value_rpm - now.value_rpm) > 1:
-                why = (edges[name].ended if name in edges else "") or "orbits between became unstable"
+                why = (moved[name].ended if name in moved else "") or "orbits between became unstable"
                 there = "open" if now is None else f"{now.value_rpm:.0f} rpm, {now.kind}"
                 self.handed_over.append(f"{name} edge: {why}; now {there}")
         return {name: solved.get(name) for name in anchor.edges}
 
+    def values(self, place: Float[np.ndarray, " n"], wanted: Sequence[Requirement]) -> dict[str, Value] | str:
+        """All values that some limits concern, at a place of the design space; or why there are none."""
+        before, names = len(self.handed_over), {r.of for r in wanted}
+        found = self.margins(place)
+        if isinstance(found, str):
+            return found
+        if len(self.handed_over) > before and min(r.slack(found[r.of])[0] for r in wanted[:2]) < -KEPT:
+            self._anchors.pop()  # the wrong side of a jump, where no slope leads back
+            return "; ".join(self.handed_over[before:])
+        if "balance" in names:
+            found["balance"] = balance_grade(self.space, self.operating, place)
+        worst = self.worst(place, tuple(name for name in ("multiplier", *READ) if name in names))
+        return worst if isinstance(worst, str) else found | worst
+
     def margins(self, place: Float[np.ndarray, " n"]) -> dict[str, Value] | str:
         """Distances of both ends of the operating range from the edges [per cent of the end's speed], negative where
-        the end lies outside; or why there are none. Where no edge is found, the distance of the search's limit."""
+        the end lies outside, with the `peak`; or why there are none. Where no edge is found, the distance of the
+        search's limit."""
         edges = self.edges(place)
         if isinstance(edges, str):
             return edges
         found = {"peak": self.peak(place, edges)}
         for name, end, limit, sign in zip(("lower", "upper"), self.operating, self.limits, (-1.0, 1.0)):
-            edge, end_rpm = edges[name], end * 30 / np.pi
+            edge = edges[name]
             if edge is None:
                 found[f"{name} margin"] = Value(100 * sign * (limit / end - 1), np.zeros(place.size))
-                continue
-            slope = 100 * sign / end_rpm * self.space.slope_of(edge.derivative)
-            found[f"{name} margin"] = Value(100 * sign * (edge.value_rpm / end_rpm - 1), slope, edge.value_rpm)
+            else:
+                slope = 100 * sign / (end * RPM) * self.space.slope_of(edge.derivative)
+                found[f"{name} margin"] = Value(100 * sign * (edge.value_rpm / (end * RPM) - 1), slope, edge.value_rpm)
         return found
+
+    # --- orbits between the edges -----------------------------------------------------------------------------------
 
     def _orbit(self, place: np.ndarray) -> Orbit | None:
         """An orbit of the stable range at a place, found from the nearest known one in parts of the way."""
@@ -278,7 +380,7 @@ class OperatingRange:
         while part > 0.05:
             there = near.place + min(done + part, 1.0) * (place - near.place)
             scale = self._scale(there, near.speed)
-            orbit = periodic_orbit(self.space.model(there), near.speed, guess=state * scale, method=self.method)
+            orbit = periodic_orbit(self.space.model(there), near.speed, guess=state * scale)
             if bool(orbit.converged) and np.max(np.abs(np.asarray(orbit.state) / scale - state)) < FAR:
                 done, state = min(done + part, 1.0), np.asarray(orbit.state) / scale
                 if done == 1:
@@ -287,160 +389,49 @@ class OperatingRange:
                 part /= 2
         return None
 
-    def through(self, place: Float[np.ndarray, " n"]) -> Branch | None:
-        """The orbits through the operating range and the margins beside it, by continuation; None if they are lost."""
+    def through(self, place: Float[np.ndarray, " n"]) -> Through | None:
+        """The orbits through the operating range and the margins beside it; None if they are lost."""
         key = np.asarray(place).tobytes()
         if key not in self._through:
             orbit, (low, high) = self._orbit(place), self.wider
-            if orbit is not None and not low < float(orbit.speed) < high:
-                orbit = None
-            given = {"lower": low, "upper": high, "method": self.method}
-            found = None if orbit is None else branch(self.space.model(place), orbit, **given)
-            self._through[key] = found if found is None or orbit is None else _between_folds(found, orbit)
+            inside = orbit is not None and low < float(orbit.speed) < high
+            self._through[key] = Through.of(self.space, place, orbit, low, high) if orbit and inside else None
         return self._through[key]
 
-    def _between(self, through: Branch, edges: Mapping[str, Sensitivity | None]) -> tuple[np.ndarray, np.ndarray]:
-        """Speeds of a branch between the edges, ascending, and the sizes of the largest multipliers there."""
+    def _between(self, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> tuple[np.ndarray, np.ndarray]:
+        """Speeds of the orbits between the edges, ascending, and sizes of their largest multipliers, 1 at an edge."""
+        if (through := self.through(place)) is None:
+            return np.zeros(0), np.zeros(0)
         (low, high), lower, upper = self.wider, edges["lower"], edges["upper"]
-        low = low if lower is None else max(low, lower.value_rpm * np.pi / 30)
-        high = high if upper is None else min(high, upper.value_rpm * np.pi / 30)
-        order = np.argsort(through.value)
-        speeds, sizes = through.value[order], np.abs(through.multipliers[order]).max(axis=1)
-        inside = (speeds > low * (1 + BESIDE)) & (speeds < high * (1 - BESIDE))
-        return speeds[inside], sizes[inside]
+        low = low if lower is None else max(low, lower.value_rpm / RPM)
+        high = high if upper is None else min(high, upper.value_rpm / RPM)
+        inside = (through.speeds > low * (1 + BESIDE)) & (through.speeds < high * (1 - BESIDE))
+        first, last = ([1.0] * (end not in self.wider) for end in (low, high))
+        speeds = [low] * len(first), through.speeds[inside], [high] * len(last)
+        return np.concatenate(speeds), np.concatenate([first, through.sizes[inside], last])
 
-    def _stable_between(self, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> bool:
-        """Whether the orbits between the edges are stable, as far as the margins reach."""
+    def _stable_ends(self, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> bool:
+        """Whether the orbits at the ends of the margins are stable, where the edges lie beyond them."""
         through = self.through(place)
-        if through is None:
-            return True
-        if np.any(self._between(through, edges)[1] >= 1):
-            return False
         for name, end, sign in (("lower", self.wider[0], 1.0), ("upper", self.wider[1], -1.0)):
             edge = edges[name]
-            if (
-                edge is None or sign * (end - edge.value_rpm * np.pi / 30) > BESIDE * end
-            ):  # the edge is beyond the margin
-                orbit = self._orbit_at(through, place, end)
-                if bool(orbit.converged) and float(np.abs(orbit.multipliers[0])) >= 1:
+            if through is not None and (edge is None or sign * (end - edge.value_rpm / RPM) > BESIDE * end):
+                if through.size(through.orbit(end), "multiplier") >= 1:
                     return False
         return True
 
     def peak(self, place: Float[np.ndarray, " n"], edges: Mapping[str, Sensitivity | None]) -> Value:
         """The largest multiplier at a maximum between the edges: where it passes 1, a new unstable range is born."""
-        through, none = self.through(place), Value(0.0, np.zeros(place.size))
-        if through is None:
-            return none
-        speeds, sizes = self._between(through, edges)
-        inner = [k for k in range(1, sizes.size - 1) if sizes[k] > max(sizes[k - 1], sizes[k + 1], PEAKING)]
-        if not inner:
-            return none
+        through, (speeds, sizes) = self.through(place), self._between(place, edges)
+        inner = [k for k in _maxima(sizes) if sizes[k] > PEAKING]
+        if through is None or not inner:
+            return Value(0.0, np.zeros(place.size))
         k = max(inner, key=lambda k: sizes[k])
-        orbit = self._largest(through, place, "multiplier", speeds[k - 1], speeds[k + 1])
-        moves = orbit_slopes(self.space, place, orbit)
-        return Value(moves.multiplier, moves.multiplier_slope, float(orbit.speed) * 30 / np.pi)
+        return through.value(through.largest("multiplier", speeds[k - 1], speeds[k + 1]), "multiplier")
 
     def worst(self, place: Float[np.ndarray, " n"], names: tuple[str, ...]) -> dict[str, Value] | str:
         """The worst over the operating range of some of `multiplier`, `film`, `land force`, `drag`; or why there is
         none. `film` is the least distance of cage and land [m], negative where they touch."""
-        through = self.through(place)
-        if through is None:
-            return "the orbits of the operating range are lost"
-        found = {}
-        for name in names:
-            orbit = self._worst_orbit(through, place, name)
-            moves = orbit_slopes(self.space, place, orbit)
-            value, slope = moves.multiplier, moves.multiplier_slope
-            if name != "multiplier":
-                at = jnp.asarray(place), orbit.speed, orbit.state
-                value = float(self._read(place, float(orbit.speed), orbit.state, orbit)[READ.index(name)])
-                moved = _read_moved(self.space, *at, jnp.asarray(moves.state_slope), _reader(orbit))
-                slope = np.asarray(moved[READ.index(name)])
-            if name == "film":
-                clearance = function_value(_clearance, self.space, jnp.asarray(place))
-                value, slope = float(clearance[0]) - value, np.asarray(clearance[1]) - slope
-            found[name] = Value(value, slope, float(orbit.speed) * 30 / np.pi)
-        return found
-
-    def _size(self, place: np.ndarray, orbit: Orbit, name: str) -> float:
-        if not bool(orbit.converged):
-            return -np.inf
-        if name == "multiplier":
-            return float(np.abs(orbit.multipliers[0]))
-        return self._read(place, float(orbit.speed), orbit.state, orbit)[READ.index(name)]
-
-    def _orbit_at(self, through: Branch, place: np.ndarray, speed: float) -> Orbit:
-        return periodic_orbit(self.space.model(place), speed, guess=_state_at(through, speed), method=self.method)
-
-    def _largest(self, through: Branch, place: np.ndarray, name: str, low: float, high: float) -> Orbit:
-        """The orbit between two speeds at which a quantity is largest, its speed to `WORST_AT`."""
-        size = lambda speed: self._size(place, self._orbit_at(through, place, float(speed)), name)
-        minus = lambda speed: -float(np.nan_to_num(size(speed), neginf=0.0))
-        options = {"xatol": WORST_AT * high}
-        found = minimize_scalar(minus, bounds=(low, high), method="bounded", options=options)
-        return self._orbit_at(through, place, float(found.x))
-
-    def _worst_orbit(self, through: Branch, place: np.ndarray, name: str) -> Orbit:
-        """The orbit within the operating range at which a quantity is worst."""
-        order, (low, high) = np.argsort(through.value), self.operating
-        inside = (through.value[order] > low) & (through.value[order] < high)
-        inner = through.value[order][inside]
-        speeds, ends = np.concatenate([[low], inner, [high]]), [self._orbit_at(through, place, s) for s in (low, high)]
-        if name == "multiplier":
-            middle = np.abs(through.multipliers[order]).max(axis=1)[inside]
-        else:
-            at = lambda speed: self._read(place, speed, _state_at(through, speed), ends[0])
-            middle = np.array([at(speed)[READ.index(name)] for speed in inner])
-        sizes = np.concatenate([[self._size(place, ends[0], name)], middle, [self._size(place, ends[1], name)]])
-        peaks = [k for k in range(1, sizes.size - 1) if sizes[k - 1] < sizes[k] >= sizes[k + 1]]
-        near_top = sizes.max() - RIVAL * np.ptp(sizes)
-        inner_peaks = [
-            self._largest(through, place, name, speeds[k - 1], speeds[k + 1]) for k in peaks if sizes[k] >= near_top
-        ]
-        return max([*ends, *inner_peaks], key=lambda orbit: self._size(place, orbit, name))
-
-    def _read(self, place: np.ndarray, speed: float, state: Any, like: Orbit) -> Float[np.ndarray, "3"]:
-        """Readings of an orbit, by the method of another one."""
-        at = jnp.asarray(place), jnp.asarray(speed, dtype=float), jnp.asarray(state)
-        return np.asarray(_read(self.space, *at, _reader(like)))
-
-
-READ = "land force", "drag", "film"
-
-
-def _clearance(model: Any) -> Any:
-    return model.clearance
-
-
-def _between_folds(found: Branch, orbit: Orbit) -> Branch:
-    """The part of a branch about one of its orbits in which the speed rises or falls throughout: past a fold there are
-    other orbits at the same speeds."""
-    size = float(orbit.speed), np.asarray(orbit.state)
-    away = np.abs(found.speed / size[0] - 1) + np.linalg.norm(found.state - size[1], axis=1) / np.linalg.norm(size[1])
-    rises = np.diff(found.speed) > 0
-    here = min(int(np.argmin(away)), rises.size - 1)
-    turns = np.flatnonzero(rises != rises[here])
-    first = int(np.max(turns[turns < here], initial=-1)) + 1
-    last = int(np.min(turns[turns > here], initial=rises.size)) + 1
-    arrays = ("value", "speed", "state", "multipliers", "stable", "steps", "error")
-    return dataclasses.replace(found, **{name: getattr(found, name)[first:last] for name in arrays})
-
-
-def _state_at(through: Branch, speed: float) -> np.ndarray:
-    order = np.argsort(through.value)
-    return np.array([np.interp(speed, through.value[order], c) for c in through.state[order].T])
-
-
-def _reader(orbit: Orbit) -> AbstractMethod:
-    """The method by which an orbit is read: its own, with a step at least from one phase to the next."""
-    method = orbit.method
-    if not isinstance(method, FixedSteps):
-        return method
-    return FixedSteps(method.solver, jnp.asarray(PARTS * -(-int(orbit.steps) // PARTS)))
-
-
-def point_of(edge: Sensitivity, before: Point | None) -> Point:
-    """The bifurcation at which an edge was found, to follow it further."""
-    assert before is not None
-    speed = edge.value_rpm * np.pi / 30
-    return Point(edge.kind, speed, np.asarray(edge.state), int(before.periods), edge.steps)
+        if names and (through := self.through(place)) is not None:
+            return {name: through.worst(name, *self.operating) for name in names}
+        return "the orbits of the operating range are lost" if names else {}

@@ -1,4 +1,4 @@
-"""What is required of a design over its operating range, and what the design costs."""
+"""What is required of a design over its operating range, what the design costs, and tolerances of manufacture."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -10,8 +10,7 @@ from jaxtyping import Array, Float
 
 from .._errors import ArgumentError
 from .._parameters import parameter_info, parameters
-from ..models import AbstractForcedSystem
-from .operating import DesignSpace, OperatingRange, Value
+from .design_space import Bounds, DesignSpace, Value
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,19 +34,18 @@ class Requirements:
     drag: float | None = None
 
     def __post_init__(self):
-        for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
-            least = 0.0 if field.name in ("margin", "land_force", "film") else 1e-12
+        for name, value in vars(self).items():
+            least = 0.0 if name in ("margin", "land_force", "film") else 1e-12
             if value is not None and not least <= value < float("inf"):
                 wanted = "at least 0" if least == 0 else "above 0"
-                raise ArgumentError(field.name, said=f"must be {wanted} and finite, but {value:g} was given.")
+                raise ArgumentError(name, said=f"must be {wanted} and finite, but {value:g} was given.")
         if self.margin >= 50:
             raise ArgumentError("margin", said=f"must be below 50 per cent, but {self.margin:g} was given.")
 
 
 class Requirement(NamedTuple):
-    """One limit: what it is called, the value it concerns, the limit, whether values must be above (1) or below (-1)
-    it, its unit, and the difference that counts as 1."""
+    """One limit: its name, the value it concerns, the limit, whether values must be above (1) or below (-1) it, its
+    unit, and the difference that counts as 1."""
 
     name: str
     of: str
@@ -71,42 +69,24 @@ def listed(keep: Requirements, model: Any) -> list[Requirement]:
     if keep.decay is not None:
         limit = float(np.exp(-1 / keep.decay))
         found.append(Requirement("decay of a disturbance", "multiplier", limit, -1.0, "1", 1 - limit))
-    if keep.film is not None:
-        found.append(Requirement("least film", "film", keep.film, 1.0, "m", max(keep.film, 1e-6)))
-    if keep.land_force == 0:
-        apart = float((1 - model.contact.onset) * model.clearance)
-        found.append(Requirement("no contact with the land", "film", apart, 1.0, "m", max(apart, 1e-6)))
-    elif keep.land_force is not None:
-        found.append(Requirement("land force", "land force", keep.land_force, -1.0, "N", keep.land_force))
-    if keep.balance is not None:
-        found.append(Requirement("balance grade", "balance", keep.balance, -1.0, "mm/s", keep.balance))
-    if keep.drag is not None:
-        found.append(Requirement("film drag", "drag", keep.drag, -1.0, "W", keep.drag))
-    return found
-
-
-def values_at(
-    range_: OperatingRange, place: Float[np.ndarray, " n"], wanted: list[Requirement]
-) -> dict[str, Value] | str:
-    """All values that some limits concern, at a place of the design space; or why there are none."""
-    found = range_.margins(place)
-    if isinstance(found, str):
-        return found
-    names = {r.of for r in wanted}
-    if "balance" in names:
-        found["balance"] = balance_grade(range_.space, range_.operating, place)
-    if through := tuple(name for name in ("multiplier", "film", "land force", "drag") if name in names):
-        worst = range_.worst(place, through)
-        if isinstance(worst, str):
-            return worst
-        found |= worst
+    apart = float((1 - model.contact.onset) * model.clearance) if keep.land_force == 0 else None
+    for name, least in (("least film", keep.film), ("no contact with the land", apart)):
+        if least is not None:
+            found.append(Requirement(name, "film", least, 1.0, "m", max(least, 1e-6)))
+    for name, of, unit, most in (
+        ("land force", "land force", "N", keep.land_force or None),
+        ("balance grade", "balance", "mm/s", keep.balance),
+        ("film drag", "drag", "W", keep.drag),
+    ):
+        if most is not None:
+            found.append(Requirement(name, of, most, -1.0, unit, most))
     return found
 
 
 def balance_grade(space: DesignSpace, operating: tuple[float, float], place: np.ndarray) -> Value:
     """Balance grade of a design at its largest speed [mm/s]."""
     high = operating[1]
-    slope = np.array([1e3 * high * span if n == "eccentricity" else 0.0 for n, span in zip(space.names, space.span)])
+    slope = 1e3 * high * space.span * (np.array(space.names) == "eccentricity")
     return Value(1e3 * high * float(parameters(space.model(place))["eccentricity"]), slope, high * 30 / np.pi)
 
 
@@ -115,38 +95,86 @@ def balance_grade(space: DesignSpace, operating: tuple[float, float], place: np.
 
 @dataclasses.dataclass(frozen=True)
 class Price:
-    """Cost of accuracy in one parameter: `amount` at `at`, in proportion to (value/at)^exponent."""
+    """Cost of accuracy in one parameter: `amount` at the value `at` [SI], in proportion to (value/at)^exponent, which
+    is negative where small values are dear."""
 
     amount: float
     at: float
-    """[SI]."""
     exponent: float = -1.0
-    """Negative where small values are dear."""
 
 
-COSTS: Mapping[str, Price] = {
-    "guidance_gap": Price(1.0, 0.45e-3),
-    "eccentricity": Price(1.0, 23e-6),
-}
+COSTS: Mapping[str, Price] = {"guidance_gap": Price(1.0, 0.45e-3), "eccentricity": Price(1.0, 23e-6)}
 """The cage of the paper's case 1a costs 2: one part for turning cage and rib to their gap, one for balancing. Both
 fall with the reciprocal of the value, a common form of tolerance costs. A default to be replaced by a shop's own."""
 Cost = Callable[[Any], Any] | Mapping[str, Price]
 
 
-def cost_function(cost: Cost | None, model: AbstractForcedSystem) -> Callable[[Any], Array]:
+def cost_function(cost: Cost | None, model: Any) -> Callable[[Any], Array]:
     """The cost of a design as a function of it that JAX differentiates.
 
     **Raises:** `ValueError` for prices of parameters that the model does not have.
     """
     if callable(cost):
         return cost
-    prices = COSTS if cost is None else cost
-    known = parameter_info(model)
+    prices, known = COSTS if cost is None else cost, parameter_info(model)
     if unknown := [name for name in prices if name not in known]:
         raise ArgumentError("cost", said=f"must name parameters of the design, but has '{unknown[0]}'.")
 
-    def total(system: AbstractForcedSystem) -> Array:
+    def total(system: Any) -> Array:
         value = parameters(system)
         return sum((p.amount * (value[n] / p.at) ** p.exponent for n, p in prices.items()), jnp.zeros(()))
 
     return total
+
+
+# --- tolerances -----------------------------------------------------------------------------------------------------
+
+
+class Tolerance(NamedTuple):
+    """Smallest and largest made value [SI]: beside the nominal one or, if `absolute`, whatever that is."""
+
+    lower: float
+    upper: float
+    absolute: bool = False
+
+    @classmethod
+    def balanced(cls, grade: float, speed: float) -> "Tolerance":
+        """An eccentricity that balancing to a grade G [mm/s] leaves at a cage speed [rad/s]: from 0 to e = G/speed."""
+        return cls(0.0, 1e-3 * grade / speed, absolute=True)
+
+    def times(self, factor: float) -> "Tolerance":
+        """A tolerance so many times as wide."""
+        return self._replace(lower=factor * self.lower, upper=factor * self.upper)
+
+    def ends(self, value: float) -> tuple[float, float]:
+        """Smallest and largest made value [SI] of a nominal one."""
+        return (self.lower, self.upper) if self.absolute else (value + self.lower, value + self.upper)
+
+
+class Budget(NamedTuple):
+    """How wide one tolerance may be while the others stay: `factor` times its `width` [SI]. `limit` is the requirement,
+    or the edge that is lost, which does not let it be wider; empty if nothing limits it."""
+
+    name: str
+    width: float
+    factor: float
+    limit: str
+
+
+def widened(model: Any, vary: Bounds, tolerance: Mapping[str, Tolerance]) -> dict[str, tuple[float, float]]:
+    """Bounds of what varies, and of what does not vary but scatters: enough room around it.
+
+    **Raises:** `ValueError` for tolerances that make no sense.
+    """
+    known, bounds = {n: float(x) for n, x in parameters(model).items()}, dict(vary)
+    for name, each in tolerance.items():
+        if name not in known:
+            raise ArgumentError("tolerance", said=f"must be of a parameter of the design, but names '{name}'.")
+        if not each.lower < each.upper:
+            raise ArgumentError("tolerance", said=f"of {name} must have a lower end below its upper end.")
+        if each.absolute and name in vary:
+            raise ArgumentError("tolerance", said=f"gives the made range of {name} itself: it cannot be varied too.")
+        if name not in vary:
+            low, *_, high = sorted([*each.ends(known[name]), known[name]])
+            bounds[name] = low - 0.5 * (high - low), high + 0.5 * (high - low)
+    return bounds

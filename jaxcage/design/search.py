@@ -1,15 +1,14 @@
 """Designs for calm operation: the lowest cost at which all requirements hold, by exact gradients.
 
 Requirements are constraints of sequential programmes within a trust region, each solved by SciPy's SLSQP, or of an
-augmented Lagrangian whose descent is optax's. A step at which an edge is lost is halved. With tolerances each
-requirement is that of the worst bearing within them: the gradient names the corner, and the edges are solved for there.
-The derivatives there are those of the worst case (the envelope theorem).
+augmented Lagrangian whose descent is optax's. With tolerances each requirement is that of the worst bearing within
+them: the gradient names the corner, and the edges are solved for there. The derivatives there are those of the worst
+case (the envelope theorem).
 """
 
-import abc
 import dataclasses
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -22,18 +21,24 @@ from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
 from ..lanes import sobol
 from ..models import AbstractForcedSystem
-from ..solve import AbstractMethod
 from .check import Checked, check_design
-from .operating import DesignSpace, OperatingRange, Value, function_value
-from .requirements import Cost, Requirement, Requirements, balance_grade, cost_function, listed, values_at
-from .tolerance import Budget, Tolerance, budget_of, corner, widened
-from .unstable_width import UnstableWidth
+from .design_space import DesignSpace, Value, function_value
+from .operating import KEPT, OperatingRange, UnstableWidth
+from .requirements import (
+    Budget,
+    Cost,
+    Requirement,
+    Requirements,
+    Tolerance,
+    cost_function,
+    listed,
+    widened,
+)
 
 
 AT_BOUND = 1e-6  # distance from a bound, over both bounds' distance, of a place at it
 WIDEST = 4.0  # largest multiple of a tolerance that is tried
 LOST = 10.0  # slack of every requirement, negative, at a trial that has no values
-KEPT = 1e-3  # slack, negative, at which a requirement still counts as kept
 ACTIVE = 5e-3  # slack below which a requirement takes part in the cost
 NEAR_STOP = 0.03  # distance of a trial that lost an edge, over the bounds, at which it stops the search
 ITERATIONS, ACCURACY = 30, 1e-4
@@ -110,21 +115,30 @@ class Design:
         return "\n".join(rows)
 
 
-class _Problem(abc.ABC):
-    """Trials of one search, each computed once."""
+class Problem:
+    """Trials of one search, each computed once.
 
-    def __init__(self, space: DesignSpace, operating: tuple[float, float], wanted: list[Requirement], free: np.ndarray):
-        self.space, self.operating, self.wanted, self.free = space, operating, wanted, free
+    **Arguments:** operating range, or width of unstable ranges, which is then the cost; requirements; cost; parameters
+    that vary; tolerances.
+    """
+
+    def __init__(
+        self,
+        range_: OperatingRange | UnstableWidth,
+        wanted: list[Requirement],
+        cost: Callable[[Any], Any] | None,
+        free: np.ndarray,
+        tolerance: dict[str, Tolerance],
+    ):
+        self.space, self.operating, self.wanted, self.free = range_.space, range_.operating, wanted, free
+        self.range, self.cost, self.tolerance = range_, cost, tolerance
         self.trials: dict[bytes, Trial] = {}
-        self.notes: list[str] = []
+        self.solved: dict[bytes, dict[str, Value] | str] = {}
 
-    @abc.abstractmethod
-    def compute(self, place: np.ndarray) -> Trial:
-        """The trial at a place."""
-
-    def foreseen(self, trial: Trial, place: np.ndarray) -> tuple[float, np.ndarray]:
-        """The cost near a trial and its derivatives, to first order where it is dear to compute."""
-        return trial.cost + float(trial.cost_slope @ (place - trial.place)), trial.cost_slope
+    @property
+    def evaluations(self) -> int:
+        """Designs whose edges were solved for."""
+        return len(self.solved)
 
     def at(self, place: np.ndarray) -> Trial:
         """The trial at a place."""
@@ -134,118 +148,64 @@ class _Problem(abc.ABC):
             self.trials[key] = self.compute(place)
         return self.trials[key]
 
+    def compute(self, place: np.ndarray) -> Trial:
+        """The trial at a place."""
+        values = self._values(place)
+        worst = values if isinstance(values, str) else self.worst(place, values, self.tolerance)
+        cost, slope = self._costs(place, values)
+        if isinstance(values, str) or isinstance(worst, str):
+            why = str(worst) if worst is values else f"within the tolerances: {worst}"
+            m, n = len(self.wanted), place.size
+            return Trial(place, cost, slope, np.full(m, -LOST), np.zeros((m, n)), {}, {}, why)
+        pairs = [r.slack(worst[r.name]) for r in self.wanted]
+        slack, by = np.array([s for s, _ in pairs]), np.array([d for _, d in pairs]).reshape(-1, place.size)
+        return Trial(place, cost, slope, slack, by, values, worst)
+
+    def _costs(self, place: np.ndarray, values: dict[str, Value] | str) -> tuple[float, np.ndarray]:
+        """The cost of a design with its values, and its derivatives by the place."""
+        if self.cost is None:
+            return (np.inf, np.zeros(place.size)) if isinstance(values, str) else values["width"][:2]
+        value, slope = function_value(self.cost, self.space, jnp.asarray(place))
+        return float(value), np.asarray(slope)
+
+    def foreseen(self, trial: Trial, place: np.ndarray) -> tuple[float, np.ndarray]:
+        """The cost near a trial and its derivatives, to first order where it is dear to compute."""
+        if self.cost is not None:
+            return self._costs(place, {})
+        return trial.cost + float(trial.cost_slope @ (place - trial.place)), trial.cost_slope
+
     def priced(self, trial: Trial, size: float) -> float:
         """The cost over a size, and what the worst requirement falls short at its price: one number to be made small,
         also for a search without derivatives."""
         return trial.cost / size + PENALTY * max(0.0, -float(np.min(trial.slack, initial=np.inf)))
 
-    def nowhere(self, place: np.ndarray, cost: float, slope: np.ndarray, why: str) -> Trial:
-        """A trial at which an edge is lost."""
-        m, n = len(self.wanted), place.size
-        return Trial(place, cost, slope, np.full(m, -LOST), np.zeros((m, n)), {}, {}, why)
-
-    @property
-    def evaluations(self) -> int:
-        """Designs whose edges were solved for."""
-        return len(self.trials)
-
-    def whole(self, x: np.ndarray, like: np.ndarray) -> np.ndarray:
-        """The place of the parameters that vary, the others as they are at `like`."""
-        place = like.copy()
-        place[self.free] = x
-        return place
-
-
-class CostProblem(_Problem):
-    """Requirements over an operating range, and a cost that is cheap to compute.
-
-    **Arguments:** operating range; requirements; cost; parameters that vary; tolerances.
-    """
-
-    def __init__(
-        self,
-        range_: OperatingRange,
-        wanted: list[Requirement],
-        cost: Callable[[Any], Any],
-        free: np.ndarray,
-        tolerance: Mapping[str, Tolerance],
-    ):
-        super().__init__(range_.space, range_.operating, wanted, free)
-        self.range, self.cost, self.tolerance, self.notes = range_, cost, tolerance, range_.handed_over
-        self.solved: dict[bytes, dict[str, Value] | str] = {}
-
-    def foreseen(self, trial: Trial, place: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = function_value(self.cost, self.space, jnp.asarray(place))
-        return float(value), np.asarray(slope)
-
-    @property
-    def evaluations(self) -> int:
-        return len(self.solved)
-
     def _values(self, place: np.ndarray) -> dict[str, Value] | str:
         """Values of one bearing; or why there are none."""
         key = place.tobytes()
         if key not in self.solved:
-            before = len(self.notes)
-            values = values_at(self.range, place, self.wanted)
-            if not isinstance(values, str) and len(self.notes) > before:
-                if min(r.slack(values[r.of])[0] for r in self.wanted[:2]) < -KEPT:
-                    values = "; ".join(self.notes[before:])  # the wrong side of a jump, where no slope leads back
-                    self.range.forget(place)
-            self.solved[key] = values
+            self.solved[key] = self.range.values(place, self.wanted)
         return self.solved[key]
 
-    def compute(self, place: np.ndarray) -> Trial:
-        value, slope = function_value(self.cost, self.space, jnp.asarray(place))
-        cost, values = (float(value), np.asarray(slope)), self._values(place)
-        if isinstance(values, str):
-            return self.nowhere(place, *cost, values)
-        made = self.worst(place, values, self.tolerance)
-        if isinstance(made, str):
-            return self.nowhere(place, *cost, f"within the tolerances: {made}")
-        pairs = [r.slack(made[r.name]) for r in self.wanted]
-        slack, by = (np.array(x) for x in zip(*pairs, strict=True))
-        return Trial(place, *cost, slack, by, values, made)
-
-    def worst(
-        self, place: np.ndarray, values: dict[str, Value], tolerance: Mapping[str, Tolerance]
-    ) -> dict[str, Value] | str:
+    def worst(self, place: np.ndarray, values: Any, tolerance: Mapping[str, Tolerance]) -> dict[str, Value] | str:
         """What each requirement concerns for the worst bearing within tolerances; or why that is not known."""
         found = {}
         for r in self.wanted:
-            there = corner(self.space, place, r.slack(values[r.of])[1], tolerance)
+            there, (_, slope) = place.copy(), r.slack(values[r.of])
+            for i, (name, value) in enumerate(self.space.values(place).items()):
+                if name in tolerance:
+                    end = tolerance[name].ends(value)[0 if slope[i] > 0 else 1]
+                    there[i] = (end - self.space.lower[i]) / self.space.span[i]
             made = self._values(there) if tolerance else values
             if isinstance(made, str):
                 return made
             found[r.name] = made[r.of]
         return found
 
-    def broken(self, trial: Trial, tolerance: Mapping[str, Tolerance]) -> str:
-        """The requirement that does not hold within other tolerances, or what is lost there; empty if all hold."""
-        made = self.worst(trial.place, trial.values, tolerance)
-        if isinstance(made, str):
-            return made
-        return next((r.name for r in self.wanted if r.slack(made[r.name])[0] < -KEPT), "")
-
-
-class _WidthProblem(_Problem):
-    """The width of unstable ranges, and a balance grade as the only requirement."""
-
-    def __init__(self, width: UnstableWidth, keep: Requirements, free: np.ndarray):
-        if others := [n for n in ("decay", "film", "land_force", "drag") if getattr(keep, n) is not None]:
-            raise ArgumentError("keep", said=f"must have no {others[0]} where the width is the objective.")
-        wanted = [r for r in listed(keep, width.space.system) if r.of == "balance"]
-        super().__init__(width.space, width.operating, wanted, free)
-        self.width = width
-
-    def compute(self, place: np.ndarray) -> Trial:
-        found = self.width.at(place)
-        if isinstance(found, str):
-            return self.nowhere(place, float("inf"), np.zeros(place.size), found)
-        values = {"width": found} | {r.of: balance_grade(self.space, self.operating, place) for r in self.wanted}
-        pairs = [r.slack(values[r.of]) for r in self.wanted]
-        slack, by = np.array([s for s, _ in pairs]), np.array([d for _, d in pairs]).reshape(-1, place.size)
-        return Trial(place, found.value, found.slope, slack, by, values, {})
+    def whole(self, x: np.ndarray, like: np.ndarray) -> np.ndarray:
+        """The place of the parameters that vary, the others as they are at `like`."""
+        place = like.copy()
+        place[self.free] = x
+        return place
 
 
 def design_for(
@@ -255,13 +215,12 @@ def design_for(
     keep: Requirements = Requirements(),
     cost: Cost | None = None,
     *,
-    objective: str = "cost",
+    objective: Literal["cost", "width"] = "cost",
     tolerance: Mapping[str, Tolerance] | None = None,
-    search: str = "slsqp",
+    search: Literal["slsqp", "augmented"] = "slsqp",
     starts: int = 1,
     seed: int = 0,
     check: int = 16,
-    method: AbstractMethod | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Design:
     """Find the cheapest design that is calm over an operating range, with margins, for every bearing within tolerances.
@@ -288,10 +247,6 @@ def design_for(
     require_x64()
     require_at_least(1, starts=starts)
     require_at_least(0, check=check)
-    if objective not in ("cost", "width"):
-        raise ArgumentError("objective", said=f"must be cost or width, but '{objective}' was given.")
-    if search not in SEARCHES:
-        raise ArgumentError("search", said=f"must be one of {', '.join(SEARCHES)}, but '{search}' was given.")
     low, high = operating
     if not 0 < low < high < float("inf"):
         raise ArgumentError("operating", said=f"must be two positive speeds, ascending, but are {low:g} and {high:g}.")
@@ -301,21 +256,23 @@ def design_for(
     say = progress or (lambda what, done, of: None)
     say("edges of the given design", 0, 1)
     if objective == "width":
-        problem: _Problem = _WidthProblem(UnstableWidth(space, operating, method), keep, free)
+        if others := [n for n in ("decay", "film", "land_force", "drag") if getattr(keep, n) is not None]:
+            raise ArgumentError("keep", said=f"must have no {others[0]} where the width is the objective.")
+        wanted = [r for r in listed(keep, model) if r.of == "balance"]
+        problem = Problem(UnstableWidth(space, operating), wanted, None, free, tolerance)
     else:
-        range_ = OperatingRange(space, operating, keep.margin, method)
-        problem = CostProblem(range_, listed(keep, model), cost_function(cost, model), free, tolerance)
+        range_ = OperatingRange(space, operating, keep.margin)
+        problem = Problem(range_, listed(keep, model), cost_function(cost, model), free, tolerance)
     own = np.where(free, np.clip(space.place, 0, 1), space.place)
-    count = int(free.sum())
-    places = [own] + [problem.whole(x, own) for x in sobol(count, max(starts, 2), seed)[: starts - 1]]
-    found = [
-        SEARCHES[search](problem, begin, lambda done, i=i: say(f"search {i + 1}", done, ITERATIONS))
-        for i, begin in enumerate(places)
-    ]
-    return _described(problem, min(found, key=lambda place: _merit(problem, place)), tolerance, check, say)
+    places = [own, *(problem.whole(x, own) for x in sobol(int(free.sum()), max(starts, 2), seed)[: starts - 1])]
+    told = lambda i: lambda done: say(f"search {i}", done, ITERATIONS)
+    found = [SEARCHES[search](problem, begin, told(i)) for i, begin in enumerate(places, start=1)]
+    best = min(found, key=lambda place: _merit(problem, place))
+    checked = check_design(space.model(best), operating, check, say) if check and not problem.at(best).lost else None
+    return _described(problem, best, checked)
 
 
-def _merit(problem: _Problem, place: np.ndarray) -> tuple[float, float]:
+def _merit(problem: Problem, place: np.ndarray) -> tuple[float, float]:
     """Order of designs: by what they fall short, then by cost."""
     trial = problem.at(place)
     return float(np.max(np.maximum(-trial.slack - KEPT, 0), initial=0.0)), trial.cost
@@ -324,38 +281,52 @@ def _merit(problem: _Problem, place: np.ndarray) -> tuple[float, float]:
 # --- searches -------------------------------------------------------------------------------------------------------
 
 
-def _programme(problem: _Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
+def _programme(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
     """The best place by sequential programmes within a trust region.
 
     Each programme has the cost itself, where it is cheap, and the requirements linearised with their exact derivatives;
-    SciPy's SLSQP solves it. Its step is one solution of the edges; a step that loses an edge, or gains less than a
-    tenth of what was foreseen, is halved. What the worst requirement falls short is bought at a price that outweighs
-    the cost, so that the search leads to a feasible place or, where there is none, to the least shortfall.
+    SciPy's SLSQP solves it. Its step is one solution of the edges; a step that loses an edge is halved, and so is one
+    that gains less than a tenth of what was foreseen, once its linearised requirements have been added. What the worst
+    requirement falls short is bought at a price that outweighs the cost, so that the search leads to a feasible place
+    or, where there is none, to the least shortfall.
     """
     trial, radius, largest = problem.at(begin), FIRST_RADIUS, LARGEST_RADIUS
-    size = max(abs(trial.cost), 1e-12)
+    size, refused = max(abs(trial.cost), 1e-12), list[Trial]()
     for turn in range(ITERATIONS):
-        step, foreseen = _step(problem, trial, radius, size)
+        step, foreseen = _step(problem, trial, refused, radius, size)
         gain = problem.priced(trial, size) - foreseen
         if gain < ACCURACY or radius < LEAST_RADIUS:
             break
         new = problem.at(problem.whole(trial.place[problem.free] + step, begin))
         kept = (problem.priced(trial, size) - problem.priced(new, size)) / gain
-        if kept < 0.25 or new.lost:
-            radius = min(radius, float(np.max(np.abs(step)))) / 2
-            largest = radius / 2 if new.lost else largest  # after this step a longer one would lose the edge again
+        reach = min(radius, float(np.max(np.abs(step))))
+        if new.lost:
+            radius, largest = reach / 2, reach / 4  # a longer step would lose the edge again
+        elif kept < 0.25:
+            radius = reach if kept <= 0.1 and not refused else reach / 2  # what was learned is tried first
         elif kept > 0.75:
-            radius = min(2 * radius, largest)
+            radius, largest = min(2 * radius, largest), min(2 * largest, LARGEST_RADIUS)
         if kept > 0.1 and not new.lost:
-            trial = new
+            trial, refused = new, []
+        elif not new.lost:
+            refused.append(new)
         say(turn + 1)
     return trial.place
 
 
-def _step(problem: _Problem, trial: Trial, radius: float, size: float) -> tuple[np.ndarray, float]:
-    """The step within a radius to where the linearised requirements hold at the least cost, and the merit there."""
-    x, slack = trial.place[problem.free], trial.slack
-    slope, last = trial.slack_slope[:, problem.free], np.append(np.zeros(x.size), PENALTY)
+def _step(
+    problem: Problem, trial: Trial, refused: Sequence[Trial], radius: float, size: float
+) -> tuple[np.ndarray, float]:
+    """The step within a radius to where the linearised requirements hold at the least cost, and the merit there.
+
+    Requirements that were linearised at refused trials hold too, such as those of another corner of the tolerances. At
+    the trial itself they may fall no shorter than it does, where a requirement bends the other way.
+    """
+    x = trial.place[problem.free]
+    below = [np.maximum(t.slack + t.slack_slope @ (trial.place - t.place), trial.slack) for t in refused]
+    slack = np.concatenate([trial.slack, *below])
+    slope = np.concatenate([trial.slack_slope, *(t.slack_slope for t in refused)])[:, problem.free]
+    last = np.append(np.zeros(x.size), PENALTY)
     bounds = [(max(-radius, -v), min(radius, 1 - v)) for v in x]
 
     def cost(z: np.ndarray) -> tuple[float, np.ndarray]:
@@ -380,17 +351,16 @@ def _step(problem: _Problem, trial: Trial, radius: float, size: float) -> tuple[
     return step, problem.foreseen(trial, problem.whole(x + step, trial.place))[0] / size + PENALTY * short
 
 
-def _augmented(problem: _Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
+def _augmented(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
     """The same by optax's Adam on an augmented Lagrangian, whose multipliers are renewed eight times."""
-    place, weight, rounds, steps = begin.copy(), 10.0, 8, 12
-    multiplier = np.zeros(len(problem.wanted))
-    size = max(abs(problem.at(begin).cost), 1e-12)
+    place, weight, rounds, steps = begin, 10.0, 8, 12
+    multiplier, size = np.zeros(len(problem.wanted)), max(abs(problem.at(begin).cost), 1e-12)
     for turn in range(rounds):
         adam = optax.adam(0.03 / (1 + turn))
         state = adam.init(jnp.asarray(place[problem.free]))
         for _ in range(steps):
             trial = problem.at(place)
-            broken = np.maximum(0.0, multiplier - weight * problem.at(place).slack)
+            broken = np.maximum(0.0, multiplier - weight * trial.slack)
             slope = (trial.cost_slope / size - broken @ trial.slack_slope)[problem.free]
             with jax.numpy_dtype_promotion("standard"):  # Adam's bias correction is a power of an integer
                 move, state = adam.update(jnp.asarray(slope), state)
@@ -415,15 +385,12 @@ SEARCHES: dict[str, Any] = {"slsqp": _programme, "augmented": _augmented}
 
 def _weights(slopes: np.ndarray, x: np.ndarray, objective: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lagrange multipliers of requirements with these slopes, and of the bounds, for a gradient of the objective."""
-    unit = np.eye(x.size)
-    low, high = np.flatnonzero(x < AT_BOUND), np.flatnonzero(x > 1 - AT_BOUND)
-    found, _ = nnls(np.column_stack([*slopes, *unit[low], *-unit[high], np.zeros(x.size)]), objective)
-    of_bound = np.zeros(x.size)
-    of_bound[np.concatenate([low, high])] = found[len(slopes) : -1]
-    return found[: len(slopes)], of_bound
+    low, high = x < AT_BOUND, x > 1 - AT_BOUND
+    found, _ = nnls(np.column_stack([*slopes, *np.diag(1.0 * low - high)]), objective)
+    return found[: len(slopes)], found[len(slopes) :]
 
 
-def _conflict(problem: _Problem, trial: Trial, names: list[str]) -> tuple[str, ...]:
+def _conflict(problem: Problem, trial: Trial, names: list[str]) -> tuple[str, ...]:
     """Requirements and bounds that together forbid a feasible design: at the least shortfall some weights make the
     slopes of the worst requirements vanish, up to bounds."""
     worst = np.flatnonzero(trial.slack < trial.slack.min() + ACTIVE)
@@ -435,39 +402,37 @@ def _conflict(problem: _Problem, trial: Trial, names: list[str]) -> tuple[str, .
     return (*against, *(f"the bound of {n}" for n, w in zip(names, bounds, strict=False) if w > 1e-3 * size))
 
 
-def _budget(problem: CostProblem, trial: Trial, tolerance: Mapping[str, Tolerance]) -> list[Budget]:
-    """How wide each tolerance may be while the others stay: foreseen at first order, then solved for at the corners,
-    and less wide until all requirements hold there."""
-    rows = []
-    for foreseen in budget_of(problem.space, tolerance, trial.slack_slope, trial.slack, problem.wanted):
-        most, found = min(foreseen.factor, WIDEST), foreseen._replace(factor=1.0)
+def _budget(problem: Problem, trial: Trial) -> list[Budget]:
+    """How wide each tolerance may be while the others stay: foreseen at first order from the slacks that are left at
+    the worst corners, then solved for at the corners, and less wide until all requirements hold there."""
+    rows, space, tolerance = [], problem.space, problem.tolerance
+    for i, name in enumerate(space.names):
+        if name not in tolerance:
+            continue
+        width = tolerance[name].upper - tolerance[name].lower
+        takes = np.abs(trial.slack_slope[:, i]) * width / 2 / space.span[i]
+        room = np.divide(np.maximum(trial.slack, 0.0), takes, out=np.full(takes.size, np.inf), where=takes > 0)
+        k, reached = int(np.argmin(room)), 1.0
+        limit = problem.wanted[k].name if np.isfinite(room[k]) else ""
+        most = min(1 + float(room[k]), WIDEST)
         for factor in (most, most**0.5, most**0.25):
-            why = problem.broken(trial, {**tolerance, foreseen.name: tolerance[foreseen.name].times(factor)})
-            found = found._replace(factor=factor if not why else 1.0, limit=why or found.limit)
-            if not why:
+            made = problem.worst(trial.place, trial.values, tolerance | {name: tolerance[name].times(factor)})
+            broken = [] if isinstance(made, str) else [r for r in problem.wanted if r.slack(made[r.name])[0] < -KEPT]
+            if not broken and not isinstance(made, str):
+                reached = factor
                 break
-        rows.append(found)
+            limit = made if isinstance(made, str) else broken[0].name
+        rows.append(Budget(name, width, reached, limit))
     return rows
 
 
-def _stop(problem: _Problem, best: np.ndarray) -> str:
-    """What a further step would have lost, if the search ended for that reason."""
-    near = [t for t in problem.trials.values() if t.lost and float(np.max(np.abs(t.place - best))) < NEAR_STOP]
-    return near[-1].lost if near else ""
-
-
-def _described(
-    problem: _Problem,
-    best: np.ndarray,
-    tolerance: Mapping[str, Tolerance],
-    check: int,
-    say: Callable[[str, int, int], None],
-) -> Design:
+def _described(problem: Problem, best: np.ndarray, checked: Checked | None) -> Design:
     """All that is known of the best place."""
     space, wanted = problem.space, problem.wanted
     trial, own, x = problem.at(best), problem.at(space.place), best[problem.free]
     names = np.array(space.names)[problem.free].tolist()
     slack, prices, conflict = trial.slack, dict[str, float](), tuple[str, ...]()
+    near = [t for t in problem.trials.values() if t.lost and float(np.max(np.abs(t.place - best))) < NEAR_STOP]
     feasible = not trial.lost and bool(np.all(slack >= -KEPT))
     if feasible:
         binding = np.flatnonzero(slack < ACTIVE)
@@ -490,10 +455,10 @@ def _described(
         prices=prices,
         at_bound=tuple(n for n, v in zip(names, x, strict=True) if min(v, 1 - v) < AT_BOUND),
         worst=trial.worst,
-        budget=_budget(problem, trial, tolerance) if isinstance(problem, CostProblem) and feasible else [],
-        stopped_by=_stop(problem, best),
-        notes=tuple(dict.fromkeys(problem.notes)),
+        budget=_budget(problem, trial) if wanted and feasible else [],
+        stopped_by=near[-1].lost if near else "",
+        notes=tuple(dict.fromkeys(problem.range.handed_over)),
         evaluations=problem.evaluations,
         path=[space.values(t.place) | {"cost": t.cost} for t in problem.trials.values() if not t.lost],
-        checked=check_design(space.model(best), problem.operating, check, say) if check and not trial.lost else None,
+        checked=checked,
     )

@@ -16,16 +16,15 @@ import xarray as xr
 from jaxtyping import Array, Float
 from scipy.special import expit
 
-from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._pytrees import compiled
 from ..analysis import CHAOS_THRESHOLD, failed
 from ..lanes import Plan, Progress, Run, Speeds, run_lanes
 from ..models import AbstractForcedSystem, CageModel, drawn_places, rolling_start
 from ..solve import AbstractMethod
+from .design_space import Models
 from .loads import LAND_LOADS, land_loads
 from .requirements import cost_function
-from .surrogate import Models, Values
 
 
 CAGE_PARAMETERS = (
@@ -72,9 +71,10 @@ class Runs:
     seed: int | None = None
     """Seed by which `starts` initial states are drawn in place of the model's own."""
     progress: Progress | None = None
+    keep: int = 1
+    settled: int = 0
 
     def __post_init__(self):
-        require_at_least(0, discard=self.discard, seed=self.seed or 0)
         if self.revolutions < self.blocks or self.revolutions % self.blocks:
             said = f"must be a multiple of {self.blocks} above 0, but {self.revolutions} was given."
             raise ArgumentError("revolutions", said=said)
@@ -103,14 +103,14 @@ class Runs:
 
     def run(self, models: Models) -> xr.Dataset:
         """The sweep of some designs."""
-        names = ("discard", "revolutions", "blocks", "exponents", "tolerance", "method")
+        names = ("discard", "revolutions", "blocks", "exponents", "tolerance", "method", "keep", "settled")
         settings = {name: getattr(self, name) for name in names}
         starts = self.starts if self.seed is None else [(0.0,) * models[0].dimension] * self.starts
         plan = Plan.over_speed(list(models), self.speed, starts)
         if self.seed is not None:
             drawn = np.concatenate([drawn_states(model, self.speed, self.starts, self.seed) for model in models])
             plan = dataclasses.replace(plan, states=drawn.reshape(plan.states.shape))
-        return run_lanes(plan, Run.of(models[0], keep=1, confirm=False, horizon=0, **settings), self.progress)
+        return run_lanes(plan, Run.of(models[0], confirm=False, horizon=0, **settings), self.progress)
 
 
 def drawn_states(
@@ -139,7 +139,7 @@ class Statistic:
     """Function of designs and their sweep. It returns numbers of the shape (designs, speeds, starts, blocks), and the
     mean of those of a design is its value."""
 
-    def values(self, runs: Runs) -> Values:
+    def values(self, runs: Runs) -> Callable[[Models], Float[np.ndarray, " designs"]]:
         """Function that runs designs and returns the value of each; NaN where a lane failed."""
         return lambda models: self.samples(models, runs.run(models)).mean(axis=(1, 2, 3))
 
@@ -187,10 +187,7 @@ def statistic(model: AbstractForcedSystem, name: str) -> Statistic:
 
 
 def statistics_of(model: AbstractForcedSystem, given: Sequence[str] | Mapping[str, Statistic]) -> dict[str, Statistic]:
-    """Statistics by name.
-
-    **Raises:** `ValueError` if there is none, or for an unknown name.
-    """
+    """Statistics by name. **Raises:** `ValueError` if there is none, or for an unknown name."""
     if not given:
         raise ArgumentError("statistics", said="must hold at least one name, but it is empty.")
     return dict(given) if isinstance(given, Mapping) else {name: statistic(model, name) for name in given}
@@ -203,22 +200,19 @@ def _cage_speed(model: Any, speed: np.ndarray) -> np.ndarray:
 
 def _negligible(model: Any, name: str, speed: np.ndarray) -> float:
     """Value that the cage's weight causes: as a force, over a revolution, rubbing with a hundredth of it."""
-    if "wear" not in name and "force" not in name and "impulse" not in name:
-        return LEAST_SLIP if name == "cage_slip" else 0.0
     weight, turning = float(model.cage_mass * model.gravity), float(np.mean(np.abs(_cage_speed(model, speed))))
     if "wear" in name:
         return float(1e9 * 3600 * model.wear.volume(LEAST_SHARE * weight * turning * float(model.land_radius)))
-    return weight if "force" in name else weight * 2 * math.pi / turning
+    if "impulse" in name:
+        return weight * 2 * math.pi / turning
+    return weight if "force" in name else LEAST_SLIP if name == "cage_slip" else 0.0
 
 
 def bearing_objective(model: AbstractForcedSystem, runs: Runs, prices: Mapping[str, float]) -> Statistic:
-    """Wear, forces, impulses, friction power, slip and balance of a whole bearing, each relative to its present value.
+    """Mean of wear, forces, impulses, friction power, slip and balance of a whole bearing by their prices, each over
+    its present value or, if that is next to nothing, over what the cage's weight would cause: 1 for the given bearing.
 
-    **Arguments:** the bearing as it is; how designs are run; prices of the `TERMS` by name: a term that is left out
-    counts nothing.
-
-    **Returns:** a statistic that is 1 for the bearing as it is, the mean of all terms by their prices. A term that is
-    next to nothing now is relative to what the cage's weight would cause.
+    **Arguments:** the bearing as it is; how designs are run; prices of the `TERMS` by name.
 
     **Raises:** `ValueError` for unknown terms, prices that are negative or all 0, and a bearing that fails in each run.
     """
@@ -240,7 +234,8 @@ def bearing_objective(model: AbstractForcedSystem, runs: Runs, prices: Mapping[s
 
 @dataclasses.dataclass(frozen=True)
 class BeforeAfter:
-    """A statistic of two designs from the same initial states, with standard errors from their scatter."""
+    """A statistic of two designs from the same initial states, and its change, with standard errors from the scatter of
+    runs and of their differences; NaN of a single one."""
 
     name: str
     unit: str
@@ -249,9 +244,7 @@ class BeforeAfter:
     after: float
     after_error: float
     change: float
-    """After less before, [unit]."""
     change_error: float
-    """Standard error of the mean difference between runs from the same initial state; NaN of a single one."""
 
     @property
     def known(self) -> bool:
@@ -282,9 +275,13 @@ def before_and_after(
         values = np.broadcast_to(each.samples(pair, found).mean(axis=3), failed(found).shape)
         known = np.all(np.isfinite(values), axis=0)
         some = np.any(known, axis=0)
-        mean = lambda x: np.average(np.where(known, x, 0.0)[:, some], axis=0, weights=known[:, some])
-        a, b = map(mean, values)
-        error = lambda x: float(x.std(ddof=1) / math.sqrt(x.size)) if x.size > 1 else math.nan
-        numbers = [f(x) for x in (a, b, b - a) for f in (lambda x: float(x.mean()) if x.size else math.nan, error)]
+        a, b = (np.average(np.where(known, x, 0.0)[:, some], axis=0, weights=known[:, some]) for x in values)
+        numbers = [number for x in (a, b, b - a) for number in mean_and_error(x)]
         rows.append(BeforeAfter(name, each.unit, *numbers))
     return rows, int(failed(found).sum())
+
+
+def mean_and_error(x: Float[np.ndarray, " n"]) -> tuple[float, float]:
+    """Mean of independent numbers and its standard error; NaN of too few."""
+    mean = float(x.mean()) if x.size else math.nan
+    return mean, float(x.std(ddof=1) / math.sqrt(x.size)) if x.size > 1 else math.nan

@@ -7,17 +7,17 @@ Scalable Global Optimization via Local Bayesian Optimization, NeurIPS 2019).
 
 import dataclasses
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Generic, TypeVar
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from .._arguments import require_at_least, require_x64
-from .._errors import ArgumentError, InputError
-from .._parameters import parameter_paths, parameters, replace
+from .._errors import InputError
 from ..lanes import sobol
 from ..models import AbstractForcedSystem
+from .design_space import Bounds, DesignSpace, Models, Places
 
 
 AT_BOUND = 0.01
@@ -33,49 +33,21 @@ AMONG = 4
 OFFSET = 5e-3
 """Part of the first value that is added to all of them, so that the logarithm of a small one has no cliff."""
 
-Design = TypeVar("Design", bound=AbstractForcedSystem)
-Models = Sequence[AbstractForcedSystem]
-Bounds = Mapping[str, tuple[float, float]]
-"""Smallest and largest value [SI] by parameter name."""
 Values = Callable[[Models], Float[np.ndarray, " designs"]]
 """Function that returns the value of each design, to be made small; NaN of a design without a value."""
-Places = Float[np.ndarray, "designs n"]
-"""Parameters of designs as parts of the way from their lower bounds to their upper ones."""
-
-
-def checked_bounds(system: AbstractForcedSystem, vary: Bounds) -> None:
-    """**Raises:** `ValueError` for a parameter that the system does not have, bounds that do not ascend, or none."""
-    if not vary:
-        raise ArgumentError("vary", said="must hold at least one parameter, but it is empty.")
-    known = parameter_paths(system)
-    for name, (low, high) in vary.items():
-        if name not in known:
-            raise InputError(f"`{name}` must be a parameter of the design: {', '.join(known)}.")
-        if not (np.isfinite([low, high]).all() and low < high):
-            raise InputError(f"Bounds of `{name}` must ascend, but {low} and {high} were given.")
-
-
-def designs_at(system: Design, vary: Bounds, places: Places) -> list[Design]:
-    """Designs at places between bounds."""
-    low, high = np.array(list(vary.values())).T
-    rows = (low + places * (high - low)).tolist()
-    return [replace(system, **dict(zip(vary, row, strict=True))) for row in rows]
 
 
 @dataclasses.dataclass(frozen=True)
-class Optimum(Generic[Design]):
-    """The best design of a search."""
+class Optimum:
+    """The best design of a search with the parameters that were varied [SI]; those that ended at a bound, which chose
+    there in place of the objective; the best value of each batch. It is not `changed` if no other design was better."""
 
-    model: Design
+    model: AbstractForcedSystem
     values: dict[str, float]
-    """Parameters that were varied [SI]."""
     objective: float
     at_bound: tuple[str, ...]
-    """Parameters that ended at a bound: there the bound chose, not the objective."""
     history: tuple[float, ...]
-    """Best value of each batch."""
     changed: bool
-    """False if the given design stays, because no other was better."""
 
     def __str__(self) -> str:
         rows = [f"Optimum after {len(self.history)} batches: {self.objective:.6g}"]
@@ -84,7 +56,7 @@ class Optimum(Generic[Design]):
 
 
 def surrogate_search(
-    system: Design,
+    system: AbstractForcedSystem,
     vary: Bounds,
     values: Values,
     *,
@@ -93,18 +65,13 @@ def surrogate_search(
     batch: int = 12,
     seed: int = 0,
     report: Callable[[int, int], None] | None = None,
-) -> Optimum[Design]:
+) -> Optimum:
     """Make the values of designs small by changing some parameters.
 
-    **Arguments:**
-
-    - `system`: the design; `vary`: bounds [SI] by parameter name, between which the design lies.
-    - `values`: function of a list of designs that returns their values.
-    - `confirm`: the same by other or longer runs. The least of many values with noise is lower than the true value
-        there, so this compares the best few designs and the given one again, and chooses among them.
-    - `batches` of `batch` designs each. The first ones, of twice as many designs as there are parameters and four,
-        lie all over the bounds, and the given design is among them.
-    - `seed`: seed of all that is drawn; `report`: called with the number of batches done and of all.
+    **Arguments:** design; bounds [SI] by parameter name, between which the design lies; function of a list of designs
+    that returns their values; the same by other or longer runs, by which the best few designs and the given one are
+    compared again, since the least of many values with noise is lower than the truth; batches of designs, of which the
+    first lie all over the bounds, the given design among them; seed; called with batches done and of all.
 
     **Raises:** `ValueError` for unknown parameters, bounds that do not ascend or do not hold the design, no batch, and
     batches of fewer than 2 designs.
@@ -113,15 +80,14 @@ def surrogate_search(
     require_at_least(1, batches=batches)
     require_at_least(2, batch=batch)
     require_at_least(0, seed=seed)
-    checked_bounds(system, vary)
-    now = parameters(system)
-    own = np.array([(float(now[name]) - low) / (high - low) for name, (low, high) in vary.items()])
+    space = DesignSpace.of(system, vary)
+    own = space.place
     if outside := [name for name, p in zip(vary, own, strict=True) if not -1e-9 <= p <= 1 + 1e-9]:
         raise InputError(f"The design itself must lie within the bounds, but {', '.join(outside)} does not.")
     search, history = SurrogateSearch(own.clip(0, 1), batch, seed), []
     for number in range(batches):
         places = search.ask()
-        search.tell(places, np.asarray(values(designs_at(system, vary, places))))
+        search.tell(places, np.asarray(values(space.models(places))))
         history.append(float(np.min(_known(search.values)[-batch:])))
         if report is not None:
             report(number + 1, batches)
@@ -129,14 +95,13 @@ def surrogate_search(
     places, found = search.places[best], search.values[best]
     if confirm is not None:
         places = np.vstack([search.first[0], places])
-        found = np.asarray(confirm(designs_at(system, vary, places)))
+        found = np.asarray(confirm(space.models(places)))
     chosen = int(np.argmin(_known(found)))
     place = places[chosen]
     changed = not np.array_equal(place, search.first[0])
-    model = designs_at(system, vary, place[None])[0] if changed else system
-    numbers = {name: float(value) for name, value in parameters(model).items() if name in vary}
+    model, place = (space.model(place), place) if changed else (system, own)
     at_bound = [name for name, p in zip(vary, place, strict=True) if min(p, 1 - p) < AT_BOUND]
-    return Optimum(model, numbers, float(found[chosen]), tuple(at_bound), tuple(history), changed)
+    return Optimum(model, space.values(place), float(found[chosen]), tuple(at_bound), tuple(history), changed)
 
 
 class SurrogateSearch:

@@ -12,7 +12,7 @@ from .._errors import ArgumentError, InputError
 from ..analysis import scatter
 from ..lanes import sobol
 from ..models import AbstractForcedSystem
-from .surrogate import Bounds, Models, checked_bounds, designs_at
+from .design_space import Bounds, DesignSpace, Models
 
 
 NARROW = 0.3
@@ -23,20 +23,17 @@ RESAMPLES, TAIL = 2000, 2.5
 
 @dataclasses.dataclass(frozen=True)
 class SobolIndices:
-    """Shares of a variance, with 95 % intervals by the bootstrap."""
+    """Shares of a variance due to a parameter alone, and with all its interactions, with 95 % intervals by the
+    bootstrap; evaluations, and base samples. `scatter` is the share of the motion itself, by the blocks of each run: it
+    belongs to no parameter, and total indices contain it. Drift between the blocks counts as scatter."""
 
     first: dict[str, float]
-    """Share due to a parameter alone."""
     total: dict[str, float]
-    """Share due to a parameter and all its interactions."""
     first_interval: dict[str, tuple[float, float]]
     total_interval: dict[str, tuple[float, float]]
     evaluations: int
     samples: int
-    """Base samples."""
     scatter: float = 0.0
-    """Share of the variance that is scatter of the motion itself, by the blocks of each run. It belongs to no
-    parameter, and total indices contain it. Drift between the blocks counts as scatter."""
 
     @property
     def doubtful(self) -> tuple[str, ...]:
@@ -87,14 +84,14 @@ def global_sensitivity(
     **Raises:** `ValueError` for unknown parameters, samples that are no power of 2, or a design without a value.
     """
     require_at_least(0, seed=seed)
-    checked_bounds(system, vary)
+    space = DesignSpace.of(system, vary)
     if samples < 2 or samples & (samples - 1):
         raise ArgumentError("samples", said=f"must be a power of 2, but {samples} was given.")
     n = len(vary)
     a, b = np.split(sobol(2 * n, samples, seed), 2, axis=1)
     mixed = [np.where(np.arange(n) == i, b, a) for i in range(n)]
     places = np.concatenate([a, b, *mixed])
-    by_block = np.asarray(values(designs_at(system, vary, places))).reshape(len(places), -1)
+    by_block = np.asarray(values(space.models(places))).reshape(len(places), -1)
     if lost := int(np.sum(~np.isfinite(by_block).all(axis=1))):
         raise InputError(f"All designs must have a value, but {lost} of {len(places)} have none.")
     f = by_block.mean(axis=1).reshape(n + 2, samples)

@@ -2,9 +2,8 @@
 
 | module         | responsibility                                                            |
 |----------------|---------------------------------------------------------------------------|
-| `units`        | texts with a unit to SI numbers                                           |
+| `units`        | texts with a unit to SI numbers; cage speed or shaft speed                |
 | `ranges`       | values that are known within a range only                                 |
-| `speeds`       | cage speed or shaft speed                                                 |
 | `schema`       | tables and keys of a configuration, from the fields of the modules        |
 | `plausibility` | values that must fit together                                             |
 | `config`       | TOML to `CageModel` or `BearingModel`, with every value checked           |
@@ -18,32 +17,14 @@ from .config import (
     BearingFile as BearingFile,
     Unknown as Unknown,
     load_model as load_model,
-    load_whole_bearing as load_whole_bearing,
     model_from as model_from,
     read_bearing as read_bearing,
-    read_whole_bearing as read_whole_bearing,
-    subject_of as subject_of,
-    whole_bearing_from as whole_bearing_from,
 )
-from .disk import (
-    check_writable as check_writable,
-    read_bytes as read_bytes,
-    replacing as replacing,
-    sync as sync,
-)
+from .disk import check_writable as check_writable, read_bytes as read_bytes, replacing as replacing, sync as sync
 from .measurements import Measurement as Measurement, read_measurements as read_measurements
 from .plausibility import check_together as check_together
 from .ranges import Range as Range, is_range as is_range, read_range as read_range
 from .schema import ConfigError as ConfigError
-from .speeds import (
-    SpeedOf as SpeedOf,
-    Whose as Whose,
-    cage_rpm as cage_rpm,
-    own_rpm as own_rpm,
-    read_rpm as read_rpm,
-    shaft_rpm as shaft_rpm,
-    split_owner as split_owner,
-)
 from .template import Subject as Subject, template as template, write_template as write_template
 from .toml import (
     configuration as configuration,
@@ -51,4 +32,11 @@ from .toml import (
     toml_text as toml_text,
     with_ranges as with_ranges,
 )
-from .units import printable as printable, to_si as to_si
+from .units import (
+    SpeedOf as SpeedOf,
+    Whose as Whose,
+    own_rpm as own_rpm,
+    read_rpm as read_rpm,
+    split_owner as split_owner,
+    to_si as to_si,
+)

@@ -20,7 +20,7 @@ import dataclasses
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Generic, TypeVar, get_args
+from typing import Any, get_args
 
 import equinox as eqx
 
@@ -33,19 +33,14 @@ from .disk import read_bytes
 from .plausibility import check_together
 from .ranges import Range
 from .schema import ConfigError, Known, read_value, submodules, values
-from .speeds import WHOSE, Whose
 from .template import Subject, left_as_written
-from .units import printable, shown
+from .units import WHOSE, Whose, printable, shown
 
-
-M = TypeVar("M", CageModel, BearingModel)
 
 Ranges = dict[tuple[str, ...], tuple[Range, tuple[str, ...]]]
 """Path of a key with a range -> the range, and the fields of that table that it sets."""
 _SHORTHANDS = {("support", "stiffness"): ("stiffness_x", "stiffness_y")}
 """Keys that set several parameters to one value."""
-_OLD = {"clearance_reading": '"as_printed"', "unbalance": '"physical"'}
-"""Meaning of a file without a reading, while readings could be left out."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,10 +55,11 @@ class Unknown:
 
 
 @dataclasses.dataclass(frozen=True)
-class BearingFile(Generic[M]):
+class BearingFile:
     """Contents of a TOML file: a model, and how its speeds are meant."""
 
-    model: M
+    model: Any
+    """A `CageModel` or a `BearingModel`."""
     speeds: Whose
     """Owner of the speeds that commands give as bare numbers: key `speeds`; by default the cage, for a whole bearing
     the shaft."""
@@ -72,49 +68,27 @@ class BearingFile(Generic[M]):
     left: tuple[str, ...]
     """Dotted names of values that are still those of the template that `jaxcage init` writes."""
     table: Mapping[str, Any]
-    """The nested mapping as it was read."""
 
 
-def load_model(path: str | Path) -> CageModel:
-    """The model that the TOML file at `path` describes.
+def load_model(path: str | Path) -> Any:
+    """The `CageModel` or `BearingModel` that the TOML file at `path` describes.
 
     **Raises:** as `read_bearing`.
     """
     return read_bearing(path).model
 
 
-def load_whole_bearing(path: str | Path) -> BearingModel:
-    """The whole bearing that the TOML file at `path` describes.
-
-    **Raises:** as `read_whole_bearing`.
-    """
-    return read_whole_bearing(path).model
-
-
-def read_bearing(path: str | Path) -> BearingFile[CageModel]:
-    """The cage that the TOML file at `path` describes, with speeds and unknowns.
+def read_bearing(path: str | Path) -> BearingFile:
+    """The cage or the whole bearing that the TOML file at `path` describes, with speeds and unknowns.
 
     **Raises:** `ConfigError`, a `ValueError` whose message is one sentence that names the file, the key, the value
     given and what is allowed; `RuntimeError` without double precision.
     """
-    return _read(path, model_from)
-
-
-def read_whole_bearing(path: str | Path) -> BearingFile[BearingModel]:
-    """The whole bearing that the TOML file at `path` describes, with speeds and unknowns.
-
-    **Raises:** as `read_bearing`.
-    """
-    return _read(path, whole_bearing_from)
-
-
-def _read(path: str | Path, make: Callable[[Mapping[str, Any], list[Unknown]], M]) -> BearingFile[M]:
     table, unknowns = _table_of(path), []
     try:
-        model = make(table, unknowns)
+        model = model_from(table, unknowns)
         subject = subject_of(table)
-        left = left_as_written(table, subject)
-        return BearingFile(model, _whose(table, subject), tuple(unknowns), left, table)
+        return BearingFile(model, _whose(table, subject), tuple(unknowns), left_as_written(table, subject), table)
     except ConfigError as error:
         raise ConfigError(f"File '{path}': {error}") from error
 
@@ -129,72 +103,38 @@ def _table_of(path: str | Path) -> dict[str, Any]:
         raise ConfigError(f"File '{path}' must be valid TOML, but is not: {reason}.") from error
 
 
-def subject_of(source: str | Path | Mapping[str, Any]) -> Subject:
-    """Subject of a file, or of a nested mapping as read from one: a cage or a whole bearing.
-
-    **Raises:** `ConfigError` for what is neither, or no TOML file.
-    """
-    if not isinstance(source, Mapping):
-        table = _table_of(source)
-        try:
-            return subject_of(table)
-        except ConfigError as error:
-            raise ConfigError(f"File '{source}': {error}") from error
-    base = source.get("base")
-    given = source.get("model", "bearing" if isinstance(base, str) and base in WHOLE_BEARINGS else "cage")
+def subject_of(table: Mapping[str, Any]) -> Subject:
+    """Subject of a nested mapping as read from a file: a cage or a whole bearing. **Raises:** `ConfigError`."""
+    base = table.get("base")
+    given = table.get("model", "bearing" if isinstance(base, str) and base in WHOLE_BEARINGS else "cage")
     if given not in get_args(Subject):
         raise ConfigError(f"`model` must be one of {', '.join(get_args(Subject))}, but is {shown(given)}.")
     return given
 
 
-def model_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) -> CageModel:
-    """The model that a nested mapping, as read from TOML, describes; a range counts with its best guess.
+def model_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) -> Any:
+    """The `CageModel` or `BearingModel` that a nested mapping, as read from TOML, describes; a range counts with its
+    best guess.
 
     **Arguments:** the mapping; a list to which the values known within ranges only are added.
 
-    **Raises:** `ConfigError`.
+    **Raises:** `ConfigError`; `RuntimeError` without double precision.
     """
     require_x64()
-    if subject_of(table) != "cage":
-        raise ConfigError('`model` must be "cage" here, but a whole bearing is described.')
-    return _made(CageModel, table, tuple(PUBLISHED_CASES), case, unknowns)
-
-
-def whole_bearing_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) -> BearingModel:
-    """The whole bearing that a nested mapping describes; a range counts with its best guess.
-
-    **Arguments:** as `model_from`.
-
-    **Raises:** `ConfigError`.
-    """
-    require_x64()
-    if subject_of(table) != "bearing":
-        raise ConfigError('`model` must be "bearing" here, but is "cage".')
-    return _made(BearingModel, table, tuple(WHOLE_BEARINGS), whole_bearing, unknowns)
-
-
-def _made(
-    kind: type[M],
-    table: Mapping[str, Any],
-    bases: tuple[str, ...],
-    base: Callable[[str], M],
-    unknowns: list[Unknown] | None,
-) -> M:
-    """A model of `kind`, from nothing or from one of `bases`."""
+    cage = subject_of(table) == "cage"
+    kind, bases = (CageModel, PUBLISHED_CASES) if cage else (BearingModel, WHOLE_BEARINGS)
     _whose(table)
-    rest, start = dict(table), None
-    for key in ("speeds", "model"):
-        rest.pop(key, None)
+    rest = {key: value for key, value in table.items() if key not in ("speeds", "model")}
+    start: Any = None
     if "base" in rest:
         name = rest.pop("base")
         if not isinstance(name, str) or name not in bases:
             raise ConfigError(f"`base` must be one of {', '.join(bases)}, but is {shown(name)}.")
-        start = base(name)
+        start = case(name) if cage else whole_bearing(name)
     if start is None and rest.get("guidance") == "inner" and "inner_land_diameter" not in rest:
         raise ConfigError('`inner_land_diameter` must be given with guidance = "inner".')
     ranges: Ranges = {}
-    model = _build(kind, rest, start, (), ranges)
-    assert isinstance(model, kind)
+    model: Any = _build(kind, rest, start, (), ranges)
     check_together(model)
     if unknowns is not None:
         unknowns += _named(model, ranges)
@@ -216,16 +156,13 @@ def _whose(table: Mapping[str, Any], subject: Subject = "cage") -> Whose:
 
 
 def _build(
-    kind: type[eqx.Module],
-    table: Mapping[str, Any],
-    start: eqx.Module | None,
-    path: tuple[str, ...],
-    ranges: Ranges,
+    kind: type[eqx.Module], table: Mapping[str, Any], start: eqx.Module | None, path: tuple[str, ...], ranges: Ranges
 ) -> eqx.Module:
     """A module of `kind` from its table; values not in the table come from `start`, or from the defaults."""
-    table = dict(table)
-    start = _ready_made(table, start, path)
-    nested, fields = submodules(kind), list(values(kind))
+    table, nested, fields = dict(table), submodules(kind), values(kind)
+    for (where, key), make in _READY_MADE.items():
+        if (where,) == path and key in table:
+            start = make(table.pop(key))
     _refuse_unknown(table, [f.name for f in fields], list(nested), path)
     arguments = {f.name: read_value(_dotted(path, f.name), table[f.name], f) for f in fields if f.name in table}
     short = {where[-1]: names for where, names in _SHORTHANDS.items() if where[:-1] == path and where[-1] in table}
@@ -246,11 +183,7 @@ def _build(
 
 
 def _build_chosen(
-    options: tuple[type[eqx.Module], ...],
-    table: Any,
-    start: eqx.Module | None,
-    path: tuple[str, ...],
-    ranges: Ranges,
+    options: tuple[type[eqx.Module], ...], table: Any, start: eqx.Module | None, path: tuple[str, ...], ranges: Ranges
 ) -> eqx.Module:
     """A sub-table, which chooses its law with `kind` where there are several."""
     if not isinstance(table, Mapping):
@@ -279,8 +212,7 @@ def _construct(kind: type[eqx.Module], arguments: dict[str, Any], path: tuple[st
         raise ConfigError(f"`{'`, `'.join(missing)}` must be given{hint}.")
     if readings := [f for f in values(kind) if "readings" in f.metadata and f.name not in arguments]:
         said = ", and ".join(f"`{_dotted(path, f.name)}` {must_be_given(f.metadata['readings'])}" for f in readings)
-        before = " and ".join(_OLD[f.name] for f in readings)
-        raise ConfigError(f"{said}; before, a file without {'them' if len(readings) > 1 else 'it'} meant {before}.")
+        raise ConfigError(f"{said}.")
     try:
         return kind(**fields_from(kind, arguments))
     except ValueError as error:
@@ -292,25 +224,13 @@ def _dotted(path: tuple[str, ...], name: str = "") -> str:
 
 
 def _refuse_unknown(table: dict, keys: list[str], tables: list[str], path: tuple[str, ...]) -> None:
-    extra = [key for (where, key) in _READY_MADE if (where,) == path]
     keys = [*keys, *(where[-1] for where in _SHORTHANDS if where[:-1] == path)]
-    allowed = [
-        *([] if path else ["base", "model", "speeds"]),
-        *extra,
-        *keys,
-        *(f"[{name}]" for name in tables),
-    ]
+    extra = [key for where, key in _READY_MADE if (where,) == path] if path else ["base", "model", "speeds"]
     for key in table:
         if key not in keys and key not in tables:
             where = f" in [{_dotted(path)}]" if path else " at the top level"
-            raise ConfigError(f"Key `{printable(key)}`{where} must be one of {', '.join(allowed)}.")
-
-
-def _ready_made(table: dict, start: eqx.Module | None, path: tuple[str, ...]) -> eqx.Module | None:
-    for (where, key), make in _READY_MADE.items():
-        if (where,) == path and key in table:
-            return make(table.pop(key))
-    return start
+            allowed = ", ".join([*extra, *keys, *(f"[{name}]" for name in tables)])
+            raise ConfigError(f"Key `{printable(key)}`{where} must be one of {allowed}.")
 
 
 def _designated(given: Any) -> eqx.Module:

@@ -15,7 +15,7 @@ LARGEST = 10_000_000
 """Largest size of a description [bytes]: a hundred times that of one written by hand."""
 
 
-def read_bytes(path: str | Path, largest: int = LARGEST) -> bytes:
+def read_bytes(path: str | Path) -> bytes:
     """The bytes of a regular file; a pipe or a device, which may never end, is refused.
 
     **Raises:** `OSError` with the reason in its `strerror`.
@@ -26,19 +26,9 @@ def read_bytes(path: str | Path, largest: int = LARGEST) -> bytes:
             raise IsADirectoryError(None, "Is a directory")
         if not stat.S_ISREG(about.st_mode):
             raise OSError(None, "it is no regular file, but a pipe, a device or the like")
-        if about.st_size > largest:
-            raise OSError(None, f"it has {about.st_size} bytes, more than the {largest} that are read")
-        return file.read(largest)
-
-
-def sync_folder(path: Path) -> None:
-    """Flush the names in a folder to the disk, if the system can do that."""
-    with contextlib.suppress(OSError):
-        handle = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+        if about.st_size > LARGEST:
+            raise OSError(None, f"it has {about.st_size} bytes, more than the {LARGEST} that are read")
+        return file.read(LARGEST)
 
 
 @contextlib.contextmanager
@@ -76,7 +66,12 @@ def sync(path: Path) -> None:
         with open(each, "rb") as file:
             os.fsync(file.fileno())
     for folder in {p.parent for p in files}:
-        sync_folder(folder)
+        with contextlib.suppress(OSError):  # not every system can flush the names in a folder
+            handle = os.open(folder, os.O_RDONLY)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
 
 
 def reason(error: OSError) -> str:

@@ -18,8 +18,7 @@ from typing import Any, Literal
 
 from .disk import read_bytes
 from .schema import ConfigError
-from .speeds import SpeedOf, Whose, cage_rpm, split_owner
-from .units import printable, to_si
+from .units import Whose, printable, split_owner, to_si
 
 
 Quantity = Literal["whirl frequency", "orbit size", "rattles", "calm"]
@@ -91,8 +90,7 @@ def _measurement(row: list[str], speeds: Whose, ratio: float) -> Measurement:
     if quantity not in UNITS:
         raise ValueError(f'`quantity` must be one of {", ".join(UNITS)}, but is "{printable(quantity)}"')
     bare, whose = split_owner(speed)
-    rpm = _size(bare, "rpm", "speed", "12000 rpm shaft")
-    rpm = cage_rpm(rpm if whose is None else SpeedOf(rpm, whose), speeds, ratio)
+    rpm = _size(bare, "rpm", "speed", "12000 rpm shaft") * (ratio if (whose or speeds) == "shaft" else 1.0)
     unit = UNITS[quantity]
     if not unit:
         if value or tolerance:

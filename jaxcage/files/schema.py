@@ -3,7 +3,6 @@
 import dataclasses
 import math
 import typing
-from collections.abc import Iterator
 from typing import Any
 
 import equinox as eqx
@@ -20,11 +19,6 @@ class ConfigError(InputError):
     """A configuration that is refused; the message is one sentence that names the key and what it may be."""
 
 
-def module_types(annotation: Any) -> tuple[type[eqx.Module], ...]:
-    """The modules that a field's annotation admits: none for a number, several for a choice of laws."""
-    return tuple(m for m in options(annotation) if isinstance(m, type) and issubclass(m, eqx.Module))
-
-
 def submodules(kind: type[eqx.Module]) -> dict[str, tuple[type[eqx.Module], ...]]:
     """Table name -> the modules it admits, for the fields of `kind` that are tables, and for its laws."""
     hints, found = typing.get_type_hints(kind), {}
@@ -32,16 +26,16 @@ def submodules(kind: type[eqx.Module]) -> dict[str, tuple[type[eqx.Module], ...]
         if field.name == "forces":
             for law in LAWS:
                 found[law.law_name] = (*found.get(law.law_name, ()), law)
-        elif options := module_types(hints[field.name]):
-            found[field.name] = options
+            continue
+        admitted = tuple(m for m in options(hints[field.name]) if isinstance(m, type) and issubclass(m, eqx.Module))
+        if admitted:  # a choice of laws admits several, and a number none
+            found[field.name] = admitted
     return found
 
 
-def values(kind: type[eqx.Module]) -> Iterator[dataclasses.Field]:
+def values(kind: type[eqx.Module]) -> list[dataclasses.Field]:
     """The fields of `kind` that are parameters, choices or counts."""
-    for field in dataclasses.fields(kind):
-        if {"parameter", "choice", "count"} & set(field.metadata):
-            yield field
+    return [f for f in dataclasses.fields(kind) if {"parameter", "choice", "count"} & set(f.metadata)]
 
 
 def read_value(name: str, value: Any, field: dataclasses.Field) -> Any:

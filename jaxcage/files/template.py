@@ -21,7 +21,7 @@ CHOSEN = ("model", "speeds", "clearance_reading", "unbalance", "kind")
 
 @functools.cache
 def template(subject: Subject = "cage") -> str:
-    """The commented TOML text that `jaxcage init` writes; `load_model`, or `load_whole_bearing`, accepts it as it is.
+    """The commented TOML text that `jaxcage init` writes; `load_model` accepts it as it is.
 
     Dimensions stand in the text. Constants that the paper does not print are filled in from those of its cases, and
     derived ones of the whole bearing from them.

@@ -36,7 +36,7 @@ def configuration(model: AbstractForcedSystem) -> dict[str, Any]:
 
 
 def _table(module: eqx.Module) -> dict[str, Any]:
-    fields = list(values(type(module)))
+    fields = values(type(module))
     plain = lambda f: float(getattr(module, f.name)) if "parameter" in f.metadata else getattr(module, f.name)
     table: dict[str, Any] = {f.name: plain(f) for f in fields}
     for name, options in submodules(type(module)).items():
@@ -58,7 +58,7 @@ def _literal(value: float | int | str) -> str:
 
 
 def save_model(path: str | Path, model: CageModel | BearingModel) -> Path:
-    """Write `model` as a TOML file that `load_model`, or `load_whole_bearing`, reads; if that fails, an earlier file
+    """Write `model` as a TOML file that `load_model` reads; if that fails, an earlier file
     stays as it was.
     """
     with replacing(path) as temporary:

@@ -1,8 +1,9 @@
-"""Text such as "0.45 mm" as a number in SI. pint is loaded with the first text."""
+"""Text such as "0.45 mm" as a number in SI, and speeds of cage or shaft. pint is loaded with the first text."""
 
 import functools
+import math
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 
 if TYPE_CHECKING:
@@ -95,3 +96,54 @@ def shown(value: Any) -> str:
         return printable(repr(value))
     except (RecursionError, ValueError):  # nested a thousand times, or of thousands of digits
         return f"a very large {type(value).__name__}"
+
+
+# --- speeds ---------------------------------------------------------------------------------------------------------
+
+Whose = Literal["cage", "shaft"]
+WHOSE: tuple[Whose, Whose] = ("cage", "shaft")
+_OWNER = re.compile(r"\b(cage|shaft)\b", re.IGNORECASE)
+
+
+class SpeedOf(float):
+    """A speed [rpm] with its owner."""
+
+    whose: Whose
+
+    def __new__(cls, value: float, whose: Whose) -> "SpeedOf":
+        found = super().__new__(cls, value)
+        found.whose = whose
+        return found
+
+
+def split_owner(text: str) -> tuple[str, Whose | None]:
+    """`20000 rpm shaft` -> (`20000 rpm`, `shaft`); None if the text does not name the owner of the speed.
+
+    **Raises:** `ValueError` with half a sentence if it names both.
+    """
+    named = {word.lower() for word in _OWNER.findall(text)}
+    if len(named) > 1:
+        raise ValueError(f'names both cage and shaft: "{printable(text.strip())}"')
+    return _OWNER.sub("", text).strip(), next((whose for whose in WHOSE if whose in named), None)
+
+
+def read_rpm(text: str) -> float:
+    """A speed [rpm] from a text such as `900 rad/s` or `20000 rpm shaft`, with its owner if the text names one.
+
+    **Raises:** `ValueError` with half a sentence.
+    """
+    speed, whose = split_owner(text)
+    value = to_si(speed, "rpm")
+    return value if whose is None else SpeedOf(value, whose)
+
+
+def own_rpm(model: Any, value: float, unsaid: Whose | None = None) -> float:
+    """The speed of a model [rpm] that `value` means, by the model's own relation of cage and shaft.
+
+    `unsaid` owns a value that does not name its owner; None takes the model's own speed.
+    """
+    own = model.speed_text.split()[0]
+    if getattr(value, "whose", unsaid or own) == own:
+        return float(value)
+    at_rest, at_one = (float(model.other_speed(speed)[1]) for speed in (0.0, 1.0))
+    return (float(value) - at_rest * 30 / math.pi) / (at_one - at_rest)

@@ -116,11 +116,12 @@ def _with_errors(found: Mapping[str, tuple[float, float]], factor: float = 1.0) 
 
 def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int, beside: Beside = None) -> Table:
     """Edges of lasting chaos, and their elasticities."""
-    names = next(iter(edges.values())).names
+    names = next(iter(edges.values())).directions
     rows = [
-        {"name": each, **chosen(edge, "speed_rpm standard_error_rpm horizon status")}
+        {"name": each, "speed_rpm": edge.value, "standard_error_rpm": edge.value_error}
+        | chosen(edge, "horizon status")
         | {"escapes": f"{edge.fit.escapes} of {edge.fit.lanes}"}
-        | _with_errors({n: edge.sum_of(*of) for n, of in _asked(names).items()})
+        | _with_errors({n: edge.elasticity_of(*of) for n, of in _asked(names).items()})
         for each, edge in edges.items()
     ]
     speed = speed_columns("speed [rpm]", "speed_rpm", beside, "standard_error_rpm")
@@ -136,7 +137,8 @@ def width_table(title: str, edges: Mapping[str, SolvedEdge], names: Sequence[str
         width: ZoneWidth = zone_width(edges, int(zone.rpartition(" ")[2]))
         row = {"name": zone, **chosen(width, "open status")}
         if width.trusted:
-            row |= chosen(width, "width_rpm standard_error_rpm")
+            known = (None, None) if width.open else (width.value, width.value_error)
+            row |= dict(zip(("width_rpm", "standard_error_rpm"), known, strict=True))
             row |= _with_errors({n: width.change(*of) for n, of in _asked(names).items()}, 0.01)
         rows.append(row)
     width_column = Column("width", "width_rpm", error="standard_error_rpm")

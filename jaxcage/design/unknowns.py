@@ -1,0 +1,329 @@
+"""Cages of which some values are known within ranges only: chances of chaos, and ranges narrowed by measurements.
+
+Each draw is a design with values from the ranges; it runs once at every speed, from the conventional start. At a speed
+the draws are independent, so that their chaotic share has the error bar of a binomial count; speeds are not.
+
+Ranges are narrowed by approximate Bayesian computation with rejection (S. A. Sisson, Y. Fan and M. A. Beaumont,
+Handbook of Approximate Bayesian Computation (2018)): even draws from the ranges run at the measured speeds, and a draw
+is accepted if every measurement is met within its tolerance. Where few are, the ranges close around the best of them,
+with a margin, and are drawn from again. A box holds less than what was learned: values that only matter together stay
+wide. What is left out may have held the truth.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import xarray as xr
+from jaxtyping import Bool, Float
+
+from .._arguments import require_at_least
+from .._errors import ArgumentError
+from .._parameters import parameter_info, replace
+from ..analysis import failed, restless
+from ..files import Measurement, Range, Unknown, check_together
+from ..lanes import Progress, sobol
+from ..models import CageModel
+from ..solve import AbstractMethod, native
+from .loads import motions
+from .statistics import Runs
+
+
+REVOLUTIONS = 100
+"""Revolutions left out, and observed: one lane is an example of a chance, and need not be known to three digits."""
+SETTLED = 64
+"""Revolutions after which a draw that is periodic is not run any further, which are three in five."""
+ERROR = 1e-2
+"""Error of a revolution [clearances] up to which a lane counts; with the default, a quarter of the draws fail."""
+RARE = 0.05
+"""Chance below which a speed is called calm, and above one less which it is called chaotic."""
+FEWEST = 29
+"""Draws without which nothing is called calm: if 10 % were chaotic, none of so many would be once in 20 times."""
+CONFIDENCE = 0.95
+BINS = 4
+"""Parts of a range whose chances are compared, to tell how much an unknown explains."""
+KEPT = 0.25
+"""Share of the draws of a stage around which the ranges close; with as many accepted the stage is the last."""
+FAR = 5.0
+"""Largest count of a miss [tolerances], also of a cage that rattles and should not. The larger of two misses counts
+more, so that a tight tolerance tells near draws from far ones."""
+FEW = 8
+"""Accepted draws without which even the last stage closes around the best ones, met or not."""
+WHOLE = 0.9
+"""Share of a range above which it is left whole."""
+
+
+def _run_draws(
+    model: CageModel, unknowns: Sequence[Unknown], place: np.ndarray, speeds: Any, method: Any, **more: Any
+) -> tuple[list[CageModel], xr.Dataset]:
+    """Designs with the values at `place` in the ranges, and their sweep, each from its own conventional initial state:
+    a state in which the cage of one design rests on its rib would press that of another into it."""
+    models = []
+    for row in place:
+        values = {name: float(u.range.at(p)) for u, p in zip(unknowns, row, strict=True) for name in u.names}
+        models.append(replace(model, **values))
+        check_together(models[-1])
+    given: dict[str, Any] = {"discard": REVOLUTIONS, "revolutions": REVOLUTIONS, "blocks": 20, "keep": 32} | more
+    settled, method = SETTLED if given["discard"] >= SETTLED else 0, method or native(error=ERROR)
+    return models, Runs(speeds, settled=settled, method=method, **given).run(models)
+
+
+def _require_some(unknowns: Sequence[Unknown]) -> None:
+    if not unknowns:
+        raise ArgumentError("unknowns", said="must hold at least one range, but it is empty.")
+
+
+# --- chances --------------------------------------------------------------------------------------------------------
+
+Verdict = Literal["calm", "chaotic", "calm as computed", "chaotic as computed", "not decided", "too few draws"]
+
+
+class Clue(NamedTuple):
+    """Share of the variance of the chaotic share that is due to an unknown alone, and `source`, how to measure it."""
+
+    label: str
+    share: float
+    source: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Ensemble:
+    """Chaos of designs that are drawn from ranges: unknowns with `sources`, how to measure each, and their SI `units`;
+    place of each draw in each range, 0 to 1; speeds [rad/s]; where a draw is chaotic while observed, or failed."""
+
+    unknowns: tuple[Unknown, ...]
+    sources: tuple[str, ...]
+    place: Float[np.ndarray, "draws unknowns"]
+    speed: Float[np.ndarray, " speeds"]
+    chaotic: Bool[np.ndarray, "draws speeds"]
+    failed: Bool[np.ndarray, "draws speeds"]
+    discard: int
+    revolutions: int
+    units: tuple[str, ...] = ()
+
+    @property
+    def rpm(self) -> Float[np.ndarray, " speeds"]:
+        """Cage speeds in revolutions per minute."""
+        return self.speed * 30 / np.pi
+
+    @property
+    def counts(self) -> tuple[np.ndarray, np.ndarray]:
+        """Chaotic draws, and draws that finished, at each speed."""
+        return np.sum(self.chaotic & ~self.failed, axis=0), np.sum(~self.failed, axis=0)
+
+    @property
+    def chance(self) -> Float[np.ndarray, " speeds"]:
+        """Share of the draws that are chaotic at each speed; NaN where none finished."""
+        chaotic, of = self.counts
+        return np.where(of > 0, chaotic / np.maximum(of, 1), np.nan)
+
+    @property
+    def interval(self) -> tuple[Float[np.ndarray, " speeds"], Float[np.ndarray, " speeds"]]:
+        """Bounds of the chance with 95 % confidence, by Clopper and Pearson: the lower one as if all that failed were
+        calm, the upper one as if all were chaotic."""
+        (chaotic, of), draws = self.counts, len(self.place)
+        return binomial_interval(chaotic, draws)[0], binomial_interval(chaotic + draws - of, draws)[1]
+
+    @property
+    def verdict(self) -> list[Verdict]:
+        """Meaning of the chance at each speed, see `verdict_of`."""
+        return [verdict_of(int(k), int(n), len(self.place)) for k, n in zip(*self.counts, strict=True)]
+
+    @property
+    def undecided(self) -> Bool[np.ndarray, " speeds"]:
+        """Speeds at which the ranges are too wide to decide."""
+        return np.array([v == "not decided" for v in self.verdict], dtype=bool)
+
+    def clues(self, which: Bool[np.ndarray, " speeds"] | None = None) -> list[Clue]:
+        """Influence of each unknown on the chaotic share of the speeds `which`, by default all undecided ones, the
+        largest first; empty where there is nothing to decide."""
+        chosen = self.undecided if which is None else which
+        y = np.mean(self.chaotic[:, chosen], axis=1) if np.any(chosen) else np.zeros(len(self.chaotic))
+        if np.ptp(y) == 0:
+            return []
+        each = zip(self.unknowns, self.place.T, self.sources, strict=True)
+        return sorted((Clue(u.label, _explained(at, y), of) for u, at, of in each), key=lambda clue: -clue.share)
+
+    def between(self, low_rpm: float, high_rpm: float) -> Bool[np.ndarray, " speeds"]:
+        """Speeds in a range, or the one that is nearest to it."""
+        inside = (self.rpm >= low_rpm) & (self.rpm <= high_rpm)
+        return inside if np.any(inside) else np.arange(self.rpm.size) == np.argmin(np.abs(self.rpm - low_rpm))
+
+
+def verdict_of(chaotic: int, finished: int, draws: int) -> Verdict:
+    """Meaning of `chaotic` draws among `finished` of `draws`.
+
+    `calm` and `chaotic` hold whatever the draws that failed would do: at most 5 %, or at least 95 %, of all draws are
+    chaotic then. `calm as computed` and `chaotic as computed` are about the draws that finished; those that failed are
+    often the ones that hit the land hardest, and others drawn in their place would not be like them.
+    """
+    if finished < FEWEST:
+        return "too few draws"
+    if chaotic + draws - finished <= RARE * draws:
+        return "calm"
+    if chaotic >= (1 - RARE) * draws:
+        return "chaotic"
+    if chaotic <= RARE * finished:
+        return "calm as computed"
+    return "chaotic as computed" if chaotic >= (1 - RARE) * finished else "not decided"
+
+
+def binomial_interval(
+    hits: np.ndarray | Sequence[int] | int, of: np.ndarray | Sequence[int] | int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Clopper and Pearson's bounds of a share, from `hits` among `of`."""
+    from scipy.stats import beta  # takes half a second to load
+
+    k, n, tail = np.asarray(hits, dtype=float), np.asarray(of, dtype=float), (1 - CONFIDENCE) / 2
+    low = np.where(k > 0, beta.ppf(tail, np.maximum(k, 1e-9), n - k + 1), 0.0)
+    high = np.where(k < n, beta.ppf(1 - tail, k + 1, np.maximum(n - k, 1e-9)), 1.0)
+    return low, high
+
+
+def _explained(place: np.ndarray, y: np.ndarray) -> float:
+    """Share of the variance of y between quarters of `place`, less what chance alone would put there."""
+    parts = np.array_split(y[np.argsort(place)], BINS)
+    between = sum(part.size * (part.mean() - y.mean()) ** 2 for part in parts)
+    within = sum(((part - part.mean()) ** 2).sum() for part in parts)
+    noise = (BINS - 1) * within / max(y.size - BINS, 1)
+    return float(max(between - noise, 0.0) / (between + within))
+
+
+def ensemble(
+    model: CageModel,
+    unknowns: Sequence[Unknown],
+    speeds: Float[np.ndarray, " speeds"],
+    *,
+    draws: int = 64,
+    seed: int = 0,
+    discard: int = REVOLUTIONS,
+    revolutions: int = REVOLUTIONS,
+    method: AbstractMethod | None = None,
+    **more: Any,
+) -> Ensemble:
+    """Run `draws` designs, spread evenly over the ranges, over speed.
+
+    **Arguments:** design; what is unknown of it; ascending speeds [rad/s]; number and seed of the draws (scrambled
+    Sobol points); revolutions left out and observed; method; more as `Runs` takes it.
+
+    **Raises:** `ValueError` if nothing is unknown, nothing is drawn, or values from the ranges do not go together.
+    """
+    _require_some(unknowns)
+    require_at_least(1, draws=draws)
+    place, info = sobol(len(unknowns), draws, seed), parameter_info(model)
+    more |= {"discard": discard, "revolutions": revolutions}
+    _, found = _run_draws(model, unknowns, place, speeds, method, **more)
+    rough, lost, at = restless(found), failed(found)[..., 0], np.asarray(speeds, dtype=float)
+    sources, units = zip(*((info[u.names[0]].source, info[u.names[0]].unit) for u in unknowns), strict=True)
+    return Ensemble(tuple(unknowns), sources, place, at, rough, lost, discard, revolutions, units)
+
+
+# --- measurements ---------------------------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True)
+class Narrowed:
+    """Ranges that are narrowed by measurements: ends of each new range in the old one, 0 to 1, and the median of the
+    accepted draws; draws of the last stage that meet all measurements, of all that each stage has; stages; how far the
+    best draw is from each measurement, in tolerances."""
+
+    unknowns: tuple[Unknown, ...]
+    lower: Float[np.ndarray, " unknowns"]
+    upper: Float[np.ndarray, " unknowns"]
+    middle: Float[np.ndarray, " unknowns"]
+    accepted: int
+    draws: int
+    stages: int
+    nearest: Float[np.ndarray, " measurements"]
+
+    @property
+    def share(self) -> Float[np.ndarray, " unknowns"]:
+        """Share of each range that is left."""
+        return self.upper - self.lower
+
+    @property
+    def narrowed(self) -> Bool[np.ndarray, " unknowns"]:
+        """True for ranges that become shorter by more than a tenth."""
+        return self.share < WHOLE
+
+    @property
+    def ranges(self) -> tuple[Range, ...]:
+        """New ranges; those that are not narrowed as they were."""
+        return tuple(
+            Range(float(u.range.at(a)), float(u.range.at(b)), float(u.range.at(m))) if worth else u.range
+            for u, a, b, m, worth in zip(self.unknowns, self.lower, self.upper, self.middle, self.narrowed, strict=True)
+        )
+
+
+Misses = Callable[[Float[np.ndarray, "draws unknowns"]], Float[np.ndarray, "draws measurements"]]
+"""Places in the ranges -> how far each draw is from each measurement, in tolerances."""
+
+
+def narrow(
+    unknowns: Sequence[Unknown], misses: Misses, *, draws: int = 128, stages: int = 4, seed: int = 0
+) -> Narrowed:
+    """Close ranges around the draws that meet the measurements.
+
+    **Arguments:** ranges; function of places in them, such as `misses`, that tells how far draws are from the
+    measurements; draws of each stage; largest number of stages; seed.
+
+    **Raises:** `ValueError` if nothing is unknown, or for fewer than 16 draws.
+    """
+    _require_some(unknowns)
+    require_at_least(16, draws=draws)
+    require_at_least(1, stages=stages)
+    lower, upper, stage = np.zeros(len(unknowns)), np.ones(len(unknowns)), 0
+    while True:
+        stage += 1
+        place = lower + (upper - lower) * sobol(len(unknowns), draws, seed + stage)
+        missed = np.where(np.isnan(far := misses(place)), math.inf, far)
+        met = np.all(missed <= 1.0, axis=1)
+        far_off = np.mean(FAR * (1 - 1 / (1 + missed / FAR)), axis=1)  # a miss counts at most FAR
+        enough = met.sum() >= KEPT * draws
+        last = enough or stage == stages
+        worst_kept = np.sort(far_off)[math.ceil(KEPT * draws) - 1]
+        chosen = met if last and (enough or met.sum() >= FEW) else far_off <= worst_kept
+        lower, upper = _closed(place[chosen], lower, upper)
+        if last:
+            best = missed[np.argmin(far_off)]
+            middle = np.median(place[chosen], axis=0)
+            return Narrowed(tuple(unknowns), lower, upper, middle, int(met.sum()), draws, stage, best)
+
+
+def _closed(place: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ends around these places, some distances of even draws beyond the outermost; a range of which they leave most
+    stays whole, since nothing was learned of it."""
+    low, high = place.min(axis=0), place.max(axis=0)
+    margin = 2.0 * (high - low) / (len(place) - 1) + 0.02 * (upper - lower)
+    low, high = np.maximum(low - margin, lower), np.minimum(high + margin, upper)
+    whole = high - low > WHOLE * (upper - lower)
+    return np.where(whole, lower, low), np.where(whole, upper, high)
+
+
+def misses(
+    model: CageModel,
+    unknowns: Sequence[Unknown],
+    measured: Sequence[Measurement],
+    place: Float[np.ndarray, "draws unknowns"],
+    *,
+    method: AbstractMethod | None = None,
+    progress: Progress | None = None,
+) -> Float[np.ndarray, "draws measurements"]:
+    """Distance of each draw from each measurement, in tolerances; NaN where it failed. A cage that is chaotic rattles:
+    its distance is 0 if that is right, else `FAR`."""
+    rpm = np.unique([m.cage_rpm for m in measured])
+    models, found = _run_draws(model, unknowns, place, rpm * np.pi / 30, method, progress=progress)
+    size, order = motions(models, found, method=native(error=ERROR))
+    columns = []
+    for m in measured:
+        i = int(np.argmin(np.abs(rpm - m.cage_rpm)))
+        if m.quantity in ("rattles", "calm"):
+            right = restless(found)[:, i] == (m.quantity == "rattles")
+            columns.append(np.where(failed(found)[:, i, 0], np.nan, np.where(right, 0.0, FAR)))
+            continue
+        whirl = m.quantity == "whirl frequency"
+        value = np.abs(order[:, i, 0]) * m.cage_rpm / 60 if whirl else size[:, i, 0]
+        columns.append(np.abs(value - m.value) / m.tolerance)
+    return np.stack(columns, axis=1)
