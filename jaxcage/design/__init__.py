@@ -14,6 +14,7 @@
 | `survival_edges` | edges of lasting chaos with their gradients, by survival regression; widths of zones    |
 | `paired_designs` | slopes of statistics by paired designs; tolerance budgets                               |
 | `variance`       | Sobol indices                                                                           |
+| `verdict`        | whether a cage is calm over an operating range, its margins, what to change first       |
 | `chances`        | chances of chaos of a cage that is known within ranges only                             |
 | `identification` | ranges narrowed by measurements                                                         |
 """
@@ -76,6 +77,15 @@ from .survival_edges import (
 from .tolerance import Budget as Budget, Tolerance as Tolerance
 from .unstable_width import UnstableWidth as UnstableWidth
 from .variance import SobolIndices as SobolIndices, global_sensitivity as global_sensitivity
+from .verdict import (
+    RANGE_SPEEDS as RANGE_SPEEDS,
+    Index as Index,
+    Margins as Margins,
+    RangeChance as RangeChance,
+    indices as indices,
+    margins as margins,
+    range_chance as range_chance,
+)
 
 
 check_layer(globals(), "design_for global_sensitivity mean_gradient surrogate_search tolerance_budget")

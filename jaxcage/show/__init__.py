@@ -121,6 +121,14 @@ from .tables import (
     rows_table as rows_table,
     shares_table as shares_table,
 )
+from .verdict_tables import (
+    changes_table as changes_table,
+    indices_note as indices_note,
+    indices_table as indices_table,
+    margin_sentence as margin_sentence,
+    margins_table as margins_table,
+    range_sentence as range_sentence,
+)
 from .zone_tables import (
     coexisting_notes as coexisting_notes,
     edge_table as edge_table,

@@ -1,0 +1,65 @@
+"""The verdict for an operating range."""
+
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+
+import jaxcage as jc
+
+from .._errors import InputError
+from . import options as o
+from .answer import Answer
+from .progress import say
+from .speed_commands import draw
+from .subject import RPM, read_case
+
+
+Operating = Annotated[str, o.text(), tyro.conf.arg(help='Range of speed of the machine, e.g. "4000-14000 rpm shaft".')]
+
+
+def check(
+    case: o.Case,
+    *,
+    operating: Operating,
+    draws: o.Draws = 64,
+    seed: o.Seed = 0,
+    steps: o.StepOptions = o.StepOptions(),
+    show: o.ShowOptions = o.ShowOptions(),
+) -> Answer:
+    """Does the cage stay calm over an operating range, with what probability and margin, and what to change first."""
+    subject, d = read_case(case), jc.design
+    subject.require_orbits("check")
+    model = subject.model
+    found = jc.show.read_operating(operating, model, subject.speeds)
+    if len(found) != 1 or found[0].low_rpm == found[0].high_rpm:
+        raise InputError(f"Option --operating must be one range of speed, but '{operating}' was given.")
+    over, ends = f"{operating}", (found[0].low_rpm / RPM, found[0].high_rpm / RPM)
+    over = f"{found[0]} of the {subject.own}"
+    if subject.shaft is not None:
+        over = f"{found[0].of_shaft(1 / subject.shaft)} of the shaft"
+    tables, notes, document = list[Any](), list[str](), {"operating_rpm": [end * RPM for end in ends]}
+    with show.computing(f"check {subject.name}") as tell:
+        margins = d.margins(model, ends)
+        margin = jc.show.margin_sentence(margins)
+        say(f"Preliminary: {margin}")
+        if subject.unknowns and draws:
+            run = o.RunOptions(steps.solver, steps.steps, steps.tolerance)
+            drawn = draw(subject, np.linspace(*ends, d.RANGE_SPEEDS), draws, seed, run, tell)
+            chance, chaotic = d.range_chance(drawn, found[0].low_rpm, found[0].high_rpm)
+            rows = d.indices(drawn, chaotic)
+            said = jc.show.range_sentence(over, chance, None)
+            document |= {"verdict": chance.state, "calm_share": chance.share, "calm_interval": chance.interval}
+            document |= {"draws": draws, "chaotic_draws": chance.chaotic, "known_draws": chance.known}
+            notes.append(jc.show.indices_note(rows))
+            decide = [jc.show.indices_table(rows)] if rows and rows[0].telling else []
+        else:
+            checked = d.check_design(model, ends, progress=tell)
+            said, decide = jc.show.range_sentence(over, None, checked), []
+            document |= {"verdict": "calm" if checked.calm else "not calm", "checked": checked}
+            notes.append(f"Checked: {checked}")
+    if not isinstance(margins, str):
+        tables.append(jc.show.margins_table(margins, subject.beside))
+        if margins.changes:
+            tables.append(jc.show.changes_table(model, margins))
+    return Answer(f"{said} {margin}", tables + decide, notes, document, subject)

@@ -1,0 +1,107 @@
+"""The verdict for an operating range: its sentence, what would decide it, and what to change first."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from .._parameters import parameter_info
+from ..design import Checked, Index, Margins, RangeChance
+from .tables import Beside, Column, Table, rows_table, speed_columns
+
+
+MOST = 6
+"""Parameters, and unknown values, that are listed."""
+FAR = 0.3
+"""Relative change of a parameter beyond which nothing is told from a first derivative."""
+
+
+def range_sentence(over: str, chance: RangeChance | None, checked: Checked | None) -> str:
+    """The verdict in a sentence: from draws of what is unknown, or from simulations of a design that is known."""
+    if chance is not None:
+        low, high = chance.interval
+        share = f"{chance.share:.0%}" if chance.known else "unknown"
+        words = {"calm": "Calm", "rattles": "The cage rattles", "not decided": "Not decided"}[chance.state]
+        return (
+            f"{words}: over {over} the cage is calm with probability {share} (95 % interval {low:.0%} to {high:.0%})."
+        )
+    assert checked is not None
+    if checked.calm:
+        return f"Calm: over {over} all {checked.starts} initial states end on the calm motion at every speed."
+    if checked.calm_share == 0:
+        return f"The cage rattles: over {over} no simulation ends on a calm motion."
+    where = "at every speed" if checked.chaotic_rpm.size == checked.speeds_rpm.size else "at some speeds"
+    where = f"and chaos is seen {where}" if checked.chaotic_rpm.size else "the others on other motions"
+    return f"Not calm from every initial state: over {over} {checked.calm_share:.0%} end calm, {where}."
+
+
+def margin_sentence(found: Margins | str) -> str:
+    """The margin of the best guess, and the change that adds most to it."""
+    if isinstance(found, str):
+        return f"No margin: {found}"
+    end, least = found.least
+    if end in found.open:
+        far = f"{found.lower.value:.0f} % below and {found.upper.value:.0f} % above it"
+        return f"At the best guess the synchronous orbit is stable over the whole range, and to {far}."
+    said = f"the {end} end of the range is {least.value:.2g} % of its speed away from a loss of stability"
+    if least.value < 0:
+        said = f"the synchronous orbit is unstable over {-least.value:.2g} % of the speed at the {end} end of the range"
+    if not (changes := found.changes):
+        return f"At the best guess {said}."
+    first = changes[0]
+    what = f"10 % {'more' if first.up else 'less'} {first.name.replace('_', ' ')}"
+    return f"At the best guess {said}; {what} adds {first.gain:.2g} %."
+
+
+def margins_table(found: Margins, beside: Beside = None) -> Table:
+    """Edges of the stable range beside the operating range."""
+    rows: list[dict[str, Any]] = []
+    for end in ("lower", "upper"):
+        margin = getattr(found, end)
+        shown = f"above {margin.value:.0f}" if end in found.open else f"{margin.value:.2f}"
+        rows.append({"end": end, "margin": shown, "rpm": margin.rpm})
+    columns = [Column("end of the range", (), key="end"), Column("margin [%]", (), key="margin")]
+    columns += speed_columns("edge at cage [rpm]", "rpm", beside)
+    decay = "does not die out" if math.isinf(found.decay) else f"falls to 1/e in {found.decay:.2g} revolutions"
+    return rows_table(f"Margins of the best guess; a disturbance {decay} at the worst speed", rows, columns, "margins")
+
+
+def changes_table(model: Any, found: Margins) -> Table:
+    """Effects of 10 % of each parameter on both margins, and the values at which the range would lose its margin."""
+    info, (end, _) = parameter_info(model), found.least
+    other = "upper" if end == "lower" else "lower"
+    rows = []
+    for change in found.changes[:MOST]:
+        unit = info[change.name].unit
+        row = vars_of(change) | {"parameter": change.name.replace("_", " ")}
+        shown = Column("", [change.value, change.limit], unit)
+        row |= dict(zip(("now", "may reach"), shown.cells, strict=True)) | {"unit": shown.unit_shown}
+        if abs(change.limit / change.value - 1) > FAR:
+            row["may reach"] = None
+        rows.append(row | {"change": "+10 %" if change.up else "-10 %"})
+    columns = [Column(head, ()) for head in ("parameter", "unit", "now", "change")]
+    columns.append(Column(f"adds to {end} margin [%]", (), key="gain", digits=2))
+    columns.append(Column(f"to {other} margin [%]", (), key="other", digits=2))
+    return rows_table("What to change first, at first order", rows, [*columns, Column("may reach", ())], "changes")
+
+
+def vars_of(found: Any) -> dict[str, Any]:
+    """Fields of a named tuple."""
+    return dict(found._asdict())
+
+
+def indices_table(rows: Sequence[Index]) -> Table:
+    """Values whose measurement would decide most, and the chance of rattling at the ends of their ranges."""
+    shown = [vars_of(row) | dict(zip(("low", "high"), row.quarters, strict=True)) for row in rows if row.telling]
+    columns = [Column("value", (), key="label"), Column("of the verdict", (), "1", "%", "error", 0, "share")]
+    columns += [Column(f"rattles in its {end} quarter", (), "1", "%", digits=0, key=end) for end in ("low", "high")]
+    title = "What would decide it: first-order indices of the unknown values"
+    return rows_table(title, shown[:MOST], columns, "indices")
+
+
+def indices_note(rows: Sequence[Index]) -> str:
+    """What to measure first, or that the draws do not tell."""
+    if not rows:
+        return "All draws agree: no unknown value within its range changes the verdict."
+    if not rows[0].telling:
+        return "The draws do not tell which unknown value to measure first (no index exceeds twice its error)."
+    return f"Measure {rows[0].label} first: {rows[0].source}"
