@@ -1,5 +1,6 @@
 """The verdict for an operating range."""
 
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -12,9 +13,12 @@ from . import options as o
 from .answer import Answer
 from .progress import say
 from .speed_commands import draw
-from .subject import RPM, read_case
+from .subject import RPM, Subject, read_case
 
 
+SPEEDS = 9
+"""Speeds at which a bearing with its rollers is simulated."""
+LENGTH: dict[str, Any] = {"starts": 2, "discard": 30, "revolutions": 20, "blocks": 4}
 Operating = Annotated[str, o.text(), tyro.conf.arg(help='Range of speed of the machine, e.g. "4000-14000 rpm shaft".')]
 
 
@@ -29,13 +33,13 @@ def check(
 ) -> Answer:
     """Does the cage stay calm over an operating range, with what probability and margin, and what to change first."""
     subject, d = read_case(case), jc.design
-    subject.require_orbits("check")
     model = subject.model
     found = jc.show.read_operating(operating, model, subject.speeds)
     if len(found) != 1 or found[0].low_rpm == found[0].high_rpm:
         raise InputError(f"Option --operating must be one range of speed, but '{operating}' was given.")
-    over, ends = f"{operating}", (found[0].low_rpm / RPM, found[0].high_rpm / RPM)
-    over = f"{found[0]} of the {subject.own}"
+    ends, over = (found[0].low_rpm / RPM, found[0].high_rpm / RPM), f"{found[0]} of the {subject.own}"
+    if subject.with_rollers:
+        return _with_rollers(subject, over, ends, show)
     if subject.shaft is not None:
         over = f"{found[0].of_shaft(1 / subject.shaft)} of the shaft"
     tables, notes, document = list[Any](), list[str](), {"operating_rpm": [end * RPM for end in ends]}
@@ -63,3 +67,18 @@ def check(
         if margins.changes:
             tables.append(jc.show.changes_table(model, margins))
     return Answer(f"{said} {margin}", tables + decide, notes, document, subject)
+
+
+def _with_rollers(subject: Subject, over: str, ends: tuple[float, float], show: o.ShowOptions) -> Answer:
+    """The verdict for a bearing with its rollers: the motion of its cage, its slip, and the makers' minimum load."""
+    speeds, motions = np.linspace(*ends, SPEEDS), jc.show.MOTIONS
+    with show.computing(f"check {subject.name}") as tell:
+        found = jc.sweep(subject.model, speeds, **LENGTH, exponents=0, progress=partial(tell, "simulations"))
+    jc.show.require_some(found)
+    table = jc.show.motion_table(f"Motion of the cage of {subject.name}", found)
+    load, bearing = float(subject.model.load), subject.model.bearing
+    notes = jc.show.minimum_load_notes(bearing, load, ends[1] * RPM)
+    notes += [f"{motions[name]}: {words}" for name, words in jc.show.MOTION_WORDS.items()]
+    notes.append(f"{SPEEDS} speeds, {found.sizes['start']} initial states, {jc.analysis.length(found)}")
+    document = {"operating_rpm": [end * RPM for end in ends], "verdict": jc.show.motion_verdict(found)}
+    return Answer(jc.show.motion_sentence(over, found), [table], notes, document, subject)

@@ -122,11 +122,17 @@ from .tables import (
     shares_table as shares_table,
 )
 from .verdict_tables import (
+    MOTION_WORDS as MOTION_WORDS,
+    MOTIONS as MOTIONS,
     changes_table as changes_table,
     indices_note as indices_note,
     indices_table as indices_table,
     margin_sentence as margin_sentence,
     margins_table as margins_table,
+    minimum_load_notes as minimum_load_notes,
+    motion_sentence as motion_sentence,
+    motion_table as motion_table,
+    motion_verdict as motion_verdict,
     range_sentence as range_sentence,
 )
 from .zone_tables import (

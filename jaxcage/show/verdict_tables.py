@@ -4,7 +4,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+import xarray as xr
+
 from .._parameters import parameter_info
+from ..bearing import listed_like, static_load_rating
 from ..design import Checked, Index, Margins, RangeChance
 from .tables import Beside, Column, Table, rows_table, speed_columns
 
@@ -105,3 +109,71 @@ def indices_note(rows: Sequence[Index]) -> str:
     if not rows[0].telling:
         return "The draws do not tell which unknown value to measure first (no index exceeds twice its error)."
     return f"Measure {rows[0].label} first: {rows[0].source}"
+
+
+MOTIONS = {"locally_periodic": "calm", "circular": "circling", "disordered": "rattling"}
+"""Motions of the centre of a cage among its rollers, as `jaxcage.analysis.motion_label` names them, in plain words."""
+MOTION_WORDS = {
+    "locally_periodic": "a revolution later the centre of the cage is within a tenth of the clearance of where it was",
+    "circular": "the centre whirls around the guide at an almost constant distance from the middle",
+    "disordered": "neither: the cage wanders or bounces in its guide",
+}
+"""What each motion means."""
+
+
+def motion_verdict(found: xr.Dataset) -> str:
+    """`calm`, `circling`, `rattles` or `rattles in part`, over all speeds and initial states that were computed."""
+    label = found["label"].values
+    some = [name for name in MOTIONS if np.any(label == name)]
+    if "disordered" in some:
+        return "rattles" if some == ["disordered"] else "rattles in part"
+    return "circling" if "circular" in some else "calm"
+
+
+def motion_sentence(over: str, found: xr.Dataset) -> str:
+    """The verdict about a bearing with its rollers."""
+    label, rpm = found["label"].transpose("speed", ...).values, found["rpm"].values
+    rough = np.any(label == "disordered", axis=1)
+    counts = {words: int(np.sum(label == name)) for name, words in MOTIONS.items()}
+    shares = ", ".join(f"{words} in {n}" for words, n in counts.items() if n)
+    verdict = motion_verdict(found)
+    said = {"calm": "Calm", "circling": "Calm or circling"}.get(verdict, "The cage " + verdict)
+    where = f", from {rpm[rough].min():.0f} to {rpm[rough].max():.0f} rpm" if rough.any() and not rough.all() else ""
+    failed = int(np.sum(label == "failed"))
+    lost = f"; {failed} failed" if failed else ""
+    return f"{said}{where}: over {over} the cage is {shares} of {label.size} simulations{lost}."
+
+
+def motion_table(title: str, found: xr.Dataset) -> Table:
+    """Motion, slip of the cage and largest pocket force by speed."""
+    rows = []
+    for i, rpm in enumerate(found["rpm"].values):
+        at = found.isel(speed=i)
+        names = [MOTIONS.get(str(name), "failed") for name in at["label"].values.ravel()]
+        row: dict[str, Any] = {"rpm": float(rpm), "motion": ", ".join(dict.fromkeys(names))}
+        rows.append(row | {name: float(np.nanmean(at[name].values)) for name in READ if name in found})
+    columns = [Column("shaft [rpm]", (), key="rpm", digits=0), Column("motion of the cage", (), key="motion")]
+    columns += [Column("slip of the cage", (), "1", "%", key=READ[0], digits=1)]
+    columns += [Column("largest pocket force", (), "N", key=READ[1]), Column("friction", (), "W", key=READ[2])]
+    return rows_table(title, rows, columns, "speeds")
+
+
+READ = "cage_slip", "pocket_force_max_N", "friction_power_W"
+"""Variables of a data set that the table shows."""
+
+
+def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float) -> list[str]:
+    """The makers' rules for the least load beside the load of a bearing."""
+    like, rating = listed_like(bearing), static_load_rating(bearing)
+    rules = [
+        ("C0/60, with C0 by ISO 76" if like is None else f"C0/60 of {like.designation}", like and like.static_rating)
+    ]
+    rules = [(words, (value or rating) / 60) for words, value in rules]
+    if like is not None:
+        usual, brass = like.minimum_loads(shaft_rpm)
+        rules += [("SKF's rule, usual cage", usual), ("SKF's rule, one-piece brass cage", brass)]
+    rules = [(words, value) for words, value in rules if math.isfinite(value)]
+    below = [words for words, value in rules if load < value]
+    said = "; ".join(f"{value / 1e3:.2g} kN ({words})" for words, value in rules)
+    verdict = f"the load of {load / 1e3:.3g} kN is {'below ' + ' and '.join(below) if below else 'above all of them'}"
+    return [f"Minimum load against skidding at {shaft_rpm:.0f} rpm of the shaft: {said}; {verdict}"]
