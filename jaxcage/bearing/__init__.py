@@ -6,16 +6,20 @@
 | `line_contact` | load and approach of a roller between two raceways: (3), (4), (10) |
 | `oil` | viscosity of the oil at its temperature (ASTM D341), oils by grade |
 | `statics` | load distribution, loaded zone, static cage displacement: (1), (2), (5), (6) |
-| `catalogue` | bearings by designation; the six published cases and the axis limits of the published figures |
+| `catalogue` | bearings by designation with ratings and minimum loads; the published cases and figure axes |
 """
 
 from .catalogue import (
-    BEARINGS as BEARINGS,
     PUBLISHED_CASES as PUBLISHED_CASES,
     PUBLISHED_SPEED_RANGE_RPM as PUBLISHED_SPEED_RANGE_RPM,
+    Listed as Listed,
     PublishedCase as PublishedCase,
+    catalogue as catalogue,
+    listed as listed,
+    listed_like as listed_like,
     nu2310 as nu2310,
     published_case as published_case,
+    static_load_rating as static_load_rating,
 )
 from .geometry import (
     Bearing as Bearing,

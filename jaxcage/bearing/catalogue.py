@@ -5,11 +5,106 @@ Bearing", Shock and Vibration 2016, article 9120505, http://dx.doi.org/10.1155/2
 Creative Commons Attribution License (CC BY). The numbers are taken from it; the readings of its misprints are ours.
 """
 
+import csv
 import dataclasses
-from collections.abc import Callable
+import functools
+import importlib.resources
+from typing import NamedTuple
 
 from .._errors import ArgumentError
 from .geometry import Bearing
+
+
+NORMAL_CLEARANCE = {24: 32.5, 30: 32.5, 40: 37.5, 50: 45.0, 65: 55.0, 80: 57.5, 100: 67.5, 120: 70.0}
+"""Largest bore [mm] -> middle of the normal radial clearance of cylindrical roller bearings [um]; ISO 5753-1."""
+POCKET = 0.3 / 16
+"""Pocket clearance over roller diameter where none is known: that of the paper's bearing."""
+
+
+class Listed(NamedTuple):
+    """A bearing of the catalogue: `catalogue.csv` has the source of each column.
+
+    Load ratings are in N, the reference and limiting speeds of the shaft in rpm. `k_r` is SKF's minimum load factor
+    with the usual cage and with a one-piece brass cage, NaN where none is printed. `estimated` names the parameters
+    of `bearing` that no catalogue prints.
+    """
+
+    designation: str
+    bearing: Bearing
+    dynamic_rating: float
+    static_rating: float
+    reference_rpm: float
+    limiting_rpm: float
+    k_r: tuple[float, float]
+    estimated: tuple[str, ...]
+
+    def minimum_loads(self, shaft_rpm: float) -> tuple[float, float]:
+        """Least radial load [N] at a shaft speed, with the usual cage and with a one-piece brass cage: SKF's rule
+        F = k_r (6 + 4 n/n_r) (d_m/100)^2 kN with d_m = (d + D)/2 in mm (Rolling bearings, 2018, p. 509)."""
+        diameter = 1e3 * float(self.bearing.bore + self.bearing.outside_diameter) / 2
+        usual, brass = (1e3 * k * (6 + 4 * shaft_rpm / self.reference_rpm) * (diameter / 100) ** 2 for k in self.k_r)
+        return usual, brass
+
+
+@functools.cache
+def catalogue() -> dict[str, Listed]:
+    """Bearings by designation, such as `NU2310`."""
+    text = importlib.resources.files(__package__).joinpath("catalogue.csv").read_text(encoding="utf-8")
+    rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
+    found = {row["designation"]: _listed(row) for row in rows}
+    return found | {"NU2310": found["NU2310"]._replace(bearing=nu2310(), estimated=())}
+
+
+def _listed(row: dict[str, str]) -> Listed:
+    """A row of `catalogue.csv`."""
+    number = lambda name: float(row[name] or "nan")
+    mm = lambda name: 1e-3 * number(name)
+    clearance = next(middle for bore, middle in NORMAL_CLEARANCE.items() if number("d") <= bore)
+    bearing = Bearing(
+        bore=mm("d"),
+        outside_diameter=mm("D"),
+        width=mm("B"),
+        n_rollers=int(row["Z"]),
+        roller_diameter=mm("Dw"),
+        roller_length=mm("Lw"),
+        rib_diameter=mm("D1"),
+        inner_raceway_diameter=mm("F"),
+        radial_clearance=1e-6 * clearance,
+        pocket_clearance=POCKET * mm("Dw"),
+    )
+    rollers = ("n_rollers", "roller_diameter", "roller_length") if row["estimated"] else ()
+    estimated = ("radial_clearance", "pocket_clearance", *rollers)
+    ratings = 1e3 * number("C"), 1e3 * number("C0")
+    factors = number("k_r"), number("k_r_brass")
+    return Listed(row["designation"], bearing, *ratings, number("n_ref"), number("n_lim"), factors, estimated)
+
+
+def listed(designation: str) -> Listed:
+    """The bearing with a designation; spaces, case and what stands behind it do not matter (`NU 2310 ECML`).
+
+    **Raises:** `ValueError` that lists the designations.
+    """
+    known, name = catalogue(), designation.upper().replace(" ", "").replace("-", "")
+    if name not in known:
+        name = name.rstrip("ABCDEFGHIJKLMNOPQRSTVWXYZ")
+    if name not in known:
+        raise ArgumentError(
+            "designation", said=f"must be one of {', '.join(known)}, but {designation!r} was given: give dimensions."
+        )
+    return known[name]
+
+
+def listed_like(bearing: Bearing) -> Listed | None:
+    """The bearing of the catalogue that has the boundary dimensions and the rollers of a given one, if there is one."""
+    key = lambda b: [round(1e6 * float(x)) for x in (b.bore, b.outside_diameter, b.width, b.roller_diameter)]
+    return next((each for each in catalogue().values() if key(each.bearing) == key(bearing)), None)
+
+
+def static_load_rating(bearing: Bearing) -> float:
+    """Basic static radial load rating [N], ISO 76: 44 (1 - d_w/d_m) Z l d_w with lengths in mm, where the effective
+    length l is 1.5 mm less than the roller's, as in printed ratings."""
+    d, length = 1e3 * float(bearing.roller_diameter), 1e3 * float(bearing.roller_length) - 1.5
+    return 44 * (1 - d / (1e3 * float(bearing.pitch_diameter))) * bearing.n_rollers * length * d
 
 
 def nu2310() -> Bearing:
@@ -26,10 +121,6 @@ def nu2310() -> Bearing:
         radial_clearance=40e-6,
         pocket_clearance=0.3e-3,
     )
-
-
-BEARINGS: dict[str, Callable[[], Bearing]] = {"NU2310": nu2310}
-"""Bearings by their designation."""
 
 
 @dataclasses.dataclass(frozen=True)

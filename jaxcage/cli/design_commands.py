@@ -141,10 +141,7 @@ def _calm_design(
 ) -> Answer:
     """The design of a cage for calm operation over a range of speed."""
     model, name = subject.model, subject.name
-    at = jc.show.read_operating(calm.operating or "", model, subject.speeds)
-    if len(at) != 1 or at[0].low_rpm == at[0].high_rpm:
-        raise InputError(f"Option --operating must be one range of speed, but '{calm.operating}' was given.")
-    low, high = at[0].low_rpm / RPM, at[0].high_rpm / RPM
+    low, high = subject.operating(calm.operating or "")
     film = None if calm.least_film is None else jc.files.to_si(calm.least_film, "m")
     keep = jc.Requirements(calm.margin, calm.decay, film, calm.land_force, calm.grade, calm.drag)
     tolerance = read_tolerances(calm.tolerance or "", subject, high)
@@ -163,8 +160,8 @@ def _calm_design(
     notes.append(f"Designs solved for: {best.evaluations}")
     names = ("verdict", "checked", "cost", "cost_before", "prices", "conflict", "at_bound", "stopped_by")
     document = {"optimum": best.values, "vary": bounds} | {name: getattr(best, name) for name in names}
-    document["operating_rpm"] = ends = at[0].low_rpm, at[0].high_rpm
-    said = _calm_sentence(best, f"{at[0]} of the {subject.own}", calm.objective)
+    document["operating_rpm"] = ends = low * RPM, high * RPM
+    said = _calm_sentence(best, f"{low * RPM:.0f} to {high * RPM:.0f} rpm of the {subject.own}", calm.objective)
     return Answer(said, tables, notes, document, {"figure": jc.show.calm_figure(best, ends, name)})
 
 

@@ -145,6 +145,16 @@ class Subject:
             raise InputError(f"Option --load goes with a bearing with its rollers, but {self.name} is a cage.")
         return self if load is None else dataclasses.replace(self, model=jc.replace(self.model, load=load))
 
+    def operating(self, given: str) -> tuple[float, float]:
+        """Ends of an operating range, as speeds of the model [rad/s].
+
+        **Raises:** `InputError` for anything but one range.
+        """
+        found = jc.show.read_operating(given, self.model, self.speeds)
+        if len(found) != 1 or found[0].low_rpm == found[0].high_rpm:
+            raise InputError(f"Option --operating must be one range of speed, but '{given}' was given.")
+        return found[0].low_rpm / RPM, found[0].high_rpm / RPM
+
     def require_orbits(self, command: str) -> None:
         """**Raises:** `InputError` for a model whose revolutions do not repeat."""
         if self.with_rollers:

@@ -17,7 +17,13 @@ from typing import Any
 from .. import __version__
 from .._cache import keep_compiled_programs
 from .._errors import ArgumentError, InputError, NoResult
-from . import case_commands as case, design_commands as design, orbit_commands as orbit, speed_commands as speed
+from . import (
+    case_commands as case,
+    check_command as checking,
+    design_commands as design,
+    orbit_commands as orbit,
+    speed_commands as speed,
+)
 from .answer import Answer, complete, print_answer
 from .options import ShowOptions, flag
 from .progress import (
@@ -34,8 +40,8 @@ from .subject import read_case
 OK, FAILED, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
 FUNCTIONS: tuple[Callable[..., Answer], ...] = (
-    *(case.init, speed.simulate, speed.sweep, orbit.zones, orbit.bifurcations, orbit.gradient, speed.compare),
-    *(speed.runup, orbit.map_, speed.study, design.design, design.sensitivity, design.identify),
+    *(case.init, checking.check, speed.simulate, speed.sweep, orbit.zones, orbit.bifurcations, orbit.gradient),
+    *(speed.compare, speed.runup, orbit.map_, speed.study, design.design, design.sensitivity, design.identify),
     *(speed.poincare, case.statics, case.report),
 )
 COMMANDS = {function.__name__.rstrip("_"): function for function in FUNCTIONS}

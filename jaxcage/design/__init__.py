@@ -14,6 +14,7 @@
 | `variance`      | Sobol indices                                                                      |
 | `surrogate`     | search for a better design by a Gaussian process                                   |
 | `unknowns`      | chances of chaos of a cage known within ranges; ranges narrowed by measurements    |
+| `verdict`       | whether a cage is calm over an operating range, its margins, what to change first  |
 """
 
 from .._arguments import check_layer
@@ -78,6 +79,15 @@ from .unknowns import (
     verdict_of as verdict_of,
 )
 from .variance import SobolIndices as SobolIndices, global_sensitivity as global_sensitivity
+from .verdict import (
+    RANGE_SPEEDS as RANGE_SPEEDS,
+    Index as Index,
+    Margins as Margins,
+    RangeChance as RangeChance,
+    indices as indices,
+    margins as margins,
+    range_chance as range_chance,
+)
 
 
 check_layer(globals(), "design_for global_sensitivity mean_gradient surrogate_search tolerance_budget")

@@ -144,7 +144,7 @@ class Ensemble:
         if np.ptp(y) == 0:
             return []
         each = zip(self.unknowns, self.place.T, self.sources, strict=True)
-        return sorted((Clue(u.label, _explained(at, y), of) for u, at, of in each), key=lambda clue: -clue.share)
+        return sorted((Clue(u.label, explained(at, y), of) for u, at, of in each), key=lambda clue: -clue.share)
 
     def between(self, low_rpm: float, high_rpm: float) -> Bool[np.ndarray, " speeds"]:
         """Speeds in a range, or the one that is nearest to it."""
@@ -182,7 +182,7 @@ def binomial_interval(
     return low, high
 
 
-def _explained(place: np.ndarray, y: np.ndarray) -> float:
+def explained(place: np.ndarray, y: np.ndarray) -> float:
     """Share of the variance of y between quarters of `place`, less what chance alone would put there."""
     parts = np.array_split(y[np.argsort(place)], BINS)
     between = sum(part.size * (part.mean() - y.mean()) ** 2 for part in parts)

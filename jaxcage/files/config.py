@@ -26,7 +26,7 @@ import equinox as eqx
 
 from .._arguments import require_x64
 from .._parameters import fields_from, must_be_given, parameter_paths
-from ..bearing import BEARINGS, PUBLISHED_CASES, vg
+from ..bearing import PUBLISHED_CASES, listed, vg
 from ..forces import PocketImpact
 from ..models import NEEDED, WHOLE_BEARINGS, BearingModel, CageModel, case, whole_bearing
 from .disk import read_bytes
@@ -234,11 +234,12 @@ def _refuse_unknown(table: dict, keys: list[str], tables: list[str], path: tuple
 
 
 def _designated(given: Any) -> eqx.Module:
-    if not isinstance(given, str) or given not in BEARINGS:
-        raise ConfigError(
-            f"`bearing.designation` must be {' or '.join(BEARINGS)}, from the catalogue, but is {shown(given)}."
-        )
-    return BEARINGS[given]()
+    if not isinstance(given, str):
+        raise ConfigError(f'`bearing.designation` must be a text such as "NU2310", but is {shown(given)}.')
+    try:
+        return listed(given).bearing
+    except ValueError as error:
+        raise ConfigError(str(error).replace("Argument `designation`", "`bearing.designation`")) from error
 
 
 def _of_grade(given: Any) -> eqx.Module:

@@ -116,6 +116,20 @@ from .slope_tables import (
 )
 from .style import drawn as drawn, new_figure as new_figure
 from .tables import Column as Column, Table as Table, counted as counted, shares_table as shares_table, table as table
+from .verdict_tables import (
+    MOTION_WORDS as MOTION_WORDS,
+    MOTIONS as MOTIONS,
+    cage_verdict as cage_verdict,
+    changes_table as changes_table,
+    indices_note as indices_note,
+    indices_table as indices_table,
+    margin_sentence as margin_sentence,
+    margins_table as margins_table,
+    minimum_load_notes as minimum_load_notes,
+    motion_sentence as motion_sentence,
+    motion_table as motion_table,
+    range_sentence as range_sentence,
+)
 from .zone_tables import (
     coexisting_notes as coexisting_notes,
     edge_table as edge_table,

@@ -1,0 +1,177 @@
+"""Does a cage stay calm over an operating range, how certain is that, and what would change it?
+
+Two independent answers go together. The design at its best guess has a stable range of speed with exact edges: the
+distance of the operating range from these edges is its margin, and has exact derivatives. Values that are known within
+ranges only are drawn, and each draw is simulated over the range: the share of draws that are chaotic somewhere in it is
+a joint probability, with the error bar of a binomial count.
+"""
+
+import dataclasses
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from .._errors import InputError
+from .._parameters import EXTRA, parameter_info, parameters
+from .design_space import DesignSpace, Value
+from .operating import OperatingRange
+from .unknowns import Ensemble, binomial_interval, explained, verdict_of
+
+
+RANGE_SPEEDS = 32
+"""Speeds of the operating range at which draws are simulated."""
+STEP = 0.1
+"""Relative change of a parameter whose effect is stated."""
+SMALL = 0.02
+"""Effects below this part of the largest one are not listed."""
+RESAMPLED = 400
+"""Bootstrap samples behind the error of an index."""
+TURNED = "drawing", "operating"
+"""Kinds of parameters that a designer or a user of the bearing can change."""
+ENDS = "lower", "upper"
+
+State = Literal["calm", "rattles", "not decided"]
+
+
+class RangeChance(NamedTuple):
+    """Draws that are chaotic at one or more speeds of a range, draws of which this is known, and all draws."""
+
+    chaotic: int
+    known: int
+    draws: int
+
+    @property
+    def share(self) -> float:
+        """Share of the known draws that are calm over the whole range; NaN if none is known."""
+        return 1 - self.chaotic / self.known if self.known else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the calm share, whatever the draws do that failed."""
+        unknown = self.draws - self.known
+        high = 1 - float(binomial_interval(self.chaotic, self.draws)[0])
+        return 1 - float(binomial_interval(self.chaotic + unknown, self.draws)[1]), high
+
+    @property
+    def state(self) -> State:
+        """`calm` or `rattles` if at least 95 % of the draws agree."""
+        found = verdict_of(self.chaotic, self.known, self.draws)
+        return "calm" if found.startswith("calm") else "rattles" if found.startswith("chaotic") else "not decided"
+
+
+def range_chance(found: Ensemble, low_rpm: float, high_rpm: float) -> tuple[RangeChance, Bool[np.ndarray, " draws"]]:
+    """The chance that a draw is calm at all speeds of a range, and the draws that are chaotic somewhere in it."""
+    which = found.between(low_rpm, high_rpm)
+    chaotic = np.any(found.chaotic[:, which] & ~found.failed[:, which], axis=1)
+    known = chaotic | ~np.any(found.failed[:, which], axis=1)
+    return RangeChance(int(chaotic.sum()), int(known.sum()), len(chaotic)), chaotic
+
+
+class Index(NamedTuple):
+    """First-order index of an unknown value: the share of the variance of the verdict that it explains by itself, with
+    its standard error; how to measure the value; chance of rattling in the lowest and highest quarter of its range."""
+
+    label: str
+    share: float
+    error: float
+    source: str
+    quarters: tuple[float, float]
+
+    @property
+    def telling(self) -> bool:
+        """True if the index differs from zero by more than twice its error."""
+        return self.share > 2 * self.error > 0
+
+
+def indices(found: Ensemble, chaotic: Bool[np.ndarray, " draws"]) -> list[Index]:
+    """First-order indices of all unknown values on whether a draw is chaotic somewhere in the range, the largest first;
+    empty if all draws agree."""
+    if np.all(chaotic == chaotic[0]):
+        return []
+    y, count = chaotic.astype(float), len(chaotic)
+    picks, rows = np.random.default_rng(0).integers(count, size=(RESAMPLED, count)), []
+    for unknown, place, source in zip(found.unknowns, found.place.T, found.sources, strict=True):
+        again = [explained(place[p], y[p]) for p in picks]
+        quarters = float(y[place < 0.25].mean()), float(y[place > 0.75].mean())
+        rows.append(Index(unknown.label, explained(place, y), float(np.std(again)), source, quarters))
+    return sorted(rows, key=lambda row: -row.share)
+
+
+@dataclasses.dataclass(frozen=True)
+class Margins:
+    """Distances of an operating range from the edges of the stable range, of the design at its best guess.
+
+    `lower` and `upper` are in per cent of the speed at that end, with derivatives by the change of each parameter in
+    units of itself; `open` names the ends at which no edge was found within the search. `decay` is the number of
+    revolutions in which a small disturbance falls to 1/e at the worst speed, infinite if it does not.
+    """
+
+    lower: Value
+    upper: Value
+    decay: float
+    names: tuple[str, ...]
+    now: Float[np.ndarray, " n"]
+    """Values of the parameters [SI]."""
+
+    @property
+    def open(self) -> tuple[str, ...]:
+        """Ends of the range beyond which no edge was found."""
+        return tuple(end for end in ("lower", "upper") if not np.isfinite(getattr(self, end).rpm))
+
+    @property
+    def least(self) -> tuple[str, Value]:
+        """The end of the range that is nearest to an edge, and its margin."""
+        known = [end for end in ("lower", "upper") if end not in self.open] or ["upper"]
+        end = min(known, key=lambda end: getattr(self, end).value)
+        return end, getattr(self, end)
+
+    @property
+    def changes(self) -> list["Change"]:
+        """Effects of single parameters on the margins, the most useful for the least margin first."""
+        end, least = self.least
+        if end in self.open:
+            return []
+        rows = []
+        for i, name in enumerate(self.names):
+            if not least.slope[i]:
+                continue
+            gain = STEP * abs(least.slope[i])
+            up = bool(least.slope[i] > 0)
+            other = STEP * (1 if up else -1) * float((self.upper if end == "lower" else self.lower).slope[i])
+            limit = float(self.now[i] * (1 - least.value / least.slope[i]))
+            rows.append(Change(name, float(self.now[i]), up, gain, other, limit))
+        rows.sort(key=lambda row: -row.gain)
+        return [row for row in rows if row.gain >= SMALL * rows[0].gain]
+
+
+class Change(NamedTuple):
+    """Effect of 10 % more (`up`) or less of a parameter, at first order: `gain` on the least margin and `other` on that
+    of the other end, per cent of speed. `limit` is the value at which the edge would reach the range [SI]."""
+
+    name: str
+    value: float
+    up: bool
+    gain: float
+    other: float
+    limit: float
+
+
+def margins(model: Any, operating: tuple[float, float]) -> Margins | str:
+    """Margins of a design over an operating range of cage speed [rad/s], or why there are none."""
+    info, known = parameter_info(model), {n: float(x) for n, x in parameters(model).items()}
+    turned = [n for n in known if (info[n].kind in TURNED or n.startswith(EXTRA)) and known[n] > 0]
+    space = DesignSpace.of(model, {n: (known[n] * (1 - STEP), known[n] * (1 + STEP)) for n in turned})
+    try:
+        range_ = OperatingRange(space, operating, 10.0)
+    except InputError as error:
+        return str(error)
+    found = range_.margins(space.place)
+    if isinstance(found, str):
+        return found
+    own = {end: found[f"{end} margin"]._replace(slope=found[f"{end} margin"].slope / (2 * STEP)) for end in ENDS}
+    worst = range_.worst(space.place, ("multiplier",))
+    largest = float("nan") if isinstance(worst, str) else worst["multiplier"].value
+    with np.errstate(divide="ignore"):
+        decay = float(-1 / np.log(largest)) if largest < 1 else float("inf")
+    return Margins(own["lower"], own["upper"], decay, tuple(turned), np.array([known[n] for n in turned]))

@@ -1,0 +1,169 @@
+"""The verdict for an operating range: its sentence, what would decide it, and what to change first."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from .._parameters import parameter_info
+from ..bearing import listed_like, static_load_rating
+from ..design import Checked, Index, Margins, RangeChance
+from .tables import OWN, UNIT, Beside, Column, Table, speed_columns, table
+
+
+MOST = 6
+"""Parameters, and unknown values, that are listed."""
+FAR = 0.3
+"""Relative change of a parameter beyond which nothing is told from a first derivative."""
+
+
+def range_sentence(over: str, chance: RangeChance | None, checked: Checked | None) -> str:
+    """The verdict in a sentence: from draws of what is unknown, or from simulations of a design that is known."""
+    if chance is not None:
+        low, high = chance.interval
+        share = f"{chance.share:.0%}" if chance.known else "unknown"
+        words = {"calm": "Calm", "rattles": "The cage rattles", "not decided": "Not decided"}[chance.state]
+        return (
+            f"{words}: over {over} the cage is calm with probability {share} (95 % interval {low:.0%} to {high:.0%})."
+        )
+    assert checked is not None
+    if checked.calm:
+        return f"Calm: over {over} all {checked.starts} initial states end on the calm motion at every speed."
+    share = checked.shares.get("periodic-1", 0.0)
+    if share == 0:
+        return f"The cage rattles: over {over} no simulation ends on a calm motion."
+    where = "at every speed" if checked.chaotic_rpm.size == checked.speeds_rpm.size else "at some speeds"
+    where = f"and chaos is seen {where}" if checked.chaotic_rpm.size else "the others on other motions"
+    return f"Not calm from every initial state: over {over} {share:.0%} end calm, {where}."
+
+
+def margin_sentence(found: Margins | str) -> str:
+    """The margin of the best guess, and the change that adds most to it."""
+    if isinstance(found, str):
+        return f"No margin: {found}"
+    end, least = found.least
+    if end in found.open:
+        far = f"{found.lower.value:.0f} % below and {found.upper.value:.0f} % above it"
+        return f"At the best guess the synchronous orbit is stable over the whole range, and to {far}."
+    said = f"the {end} end of the range is {least.value:.2g} % of its speed away from a loss of stability"
+    if least.value < 0:
+        said = f"the synchronous orbit is unstable over {-least.value:.2g} % of the speed at the {end} end of the range"
+    if not (changes := found.changes):
+        return f"At the best guess {said}."
+    first = changes[0]
+    what = f"10 % {'more' if first.up else 'less'} {first.name.replace('_', ' ')}"
+    return f"At the best guess {said}; {what} adds {first.gain:.2g} %."
+
+
+def margins_table(found: Margins, beside: Beside = None) -> Table:
+    """Edges of the stable range beside the operating range."""
+    rows: list[dict[str, Any]] = []
+    for end in ("lower", "upper"):
+        margin = getattr(found, end)
+        shown = f"above {margin.value:.0f}" if end in found.open else f"{margin.value:.2f}"
+        rows.append({"end of the range": end, "margin [%]": shown, "margin": margin.value, "rpm": margin.rpm})
+    decay = "does not die out" if math.isinf(found.decay) else f"falls to 1/e in {found.decay:.2g} revolutions"
+    columns = ["end of the range", "margin [%]", *speed_columns("edge at cage [rpm]", "rpm", beside)]
+    return table(f"Margins of the best guess; a disturbance {decay} at the worst speed", rows, columns, "margins")
+
+
+def changes_table(model: Any, found: Margins) -> Table:
+    """Effects of 10 % of each parameter on both margins, and the values at which the range would lose its margin."""
+    info, (end, _), rows = parameter_info(model), found.least, []
+    other = "upper" if end == "lower" else "lower"
+    for change in found.changes[:MOST]:
+        row = dict(change._asdict()) | {"parameter": change.name.replace("_", " "), "unit": info[change.name].unit}
+        limit = change.limit if abs(change.limit / change.value - 1) <= FAR else None
+        rows.append(row | {"change": "+10 %" if change.up else "-10 %", "limit": limit})
+    columns = ["parameter", UNIT, Column("now", "value", OWN), "change"]
+    columns.append(Column(f"adds to {end} margin [%]", "gain", digits=2))
+    columns += [Column(f"to {other} margin [%]", "other", digits=2), Column("may reach", "limit", OWN)]
+    return table("What to change first, at first order", rows, columns, "changes")
+
+
+def indices_table(rows: Sequence[Index]) -> Table:
+    """Values whose measurement would decide most, and the chance of rattling at the ends of their ranges."""
+    shown = [dict(r._asdict()) | dict(zip(("low", "high"), r.quarters, strict=True)) for r in rows if r.telling]
+    columns = [Column("value", "label"), Column("of the verdict", "share", shown="%", error="error", digits=0)]
+    columns += [Column(f"rattles in its {end} quarter", end, shown="%", digits=0) for end in ("low", "high")]
+    title = "What would decide it: first-order indices of the unknown values"
+    return table(title, shown[:MOST], columns, "indices")
+
+
+def indices_note(rows: Sequence[Index]) -> str:
+    """What to measure first, or that the draws do not tell."""
+    if not rows:
+        return "All draws agree: no unknown value within its range changes the verdict."
+    if not rows[0].telling:
+        return "The draws do not tell which unknown value to measure first (no index exceeds twice its error)."
+    return f"Measure {rows[0].label} first: {rows[0].source}"
+
+
+MOTIONS = {"locally_periodic": "calm", "circular": "circling", "disordered": "rattling"}
+"""Motions of the centre of a cage among its rollers, as `jaxcage.analysis.motion_label` names them, in plain words."""
+MOTION_WORDS = {
+    "locally_periodic": "a revolution later the centre of the cage is within a tenth of the clearance of where it was",
+    "circular": "the centre whirls around the guide at an almost constant distance from the middle",
+    "disordered": "neither: the cage wanders or bounces in its guide",
+}
+"""What each motion means."""
+
+
+def cage_verdict(found: xr.Dataset) -> str:
+    """`calm`, `circling`, `rattles` or `rattles in part`, over all speeds and initial states that were computed."""
+    label = found["label"].values
+    some = [name for name in MOTIONS if np.any(label == name)]
+    if "disordered" in some:
+        return "rattles" if some == ["disordered"] else "rattles in part"
+    return "circling" if "circular" in some else "calm"
+
+
+def motion_sentence(over: str, found: xr.Dataset) -> str:
+    """The verdict about a bearing with its rollers."""
+    label, rpm = found["label"].transpose("speed", ...).values, found["rpm"].values
+    rough = np.any(label == "disordered", axis=1)
+    counts = {words: int(np.sum(label == name)) for name, words in MOTIONS.items()}
+    shares = ", ".join(f"{words} in {n}" for words, n in counts.items() if n)
+    verdict = cage_verdict(found)
+    said = {"calm": "Calm", "circling": "Calm or circling"}.get(verdict, "The cage " + verdict)
+    where = f", from {rpm[rough].min():.0f} to {rpm[rough].max():.0f} rpm" if rough.any() and not rough.all() else ""
+    failed = int(np.sum(label == "failed"))
+    lost = f"; {failed} failed" if failed else ""
+    return f"{said}{where}: over {over} the cage is {shares} of {label.size} simulations{lost}."
+
+
+def motion_table(title: str, found: xr.Dataset) -> Table:
+    """Motion, slip of the cage and largest pocket force by speed."""
+    rows = []
+    for i, rpm in enumerate(found["rpm"].values):
+        at = found.isel(speed=i)
+        names = [MOTIONS.get(str(name), "failed") for name in at["label"].values.ravel()]
+        row: dict[str, Any] = {"rpm": float(rpm), "motion": ", ".join(dict.fromkeys(names))}
+        rows.append(row | {name: float(np.nanmean(at[name].values)) for name in READ if name in found})
+    columns = [Column("shaft [rpm]", "rpm", digits=0), Column("motion of the cage", "motion")]
+    columns += [Column("slip of the cage", READ[0], shown="%", digits=1)]
+    columns += [Column("largest pocket force", READ[1], "N"), Column("friction", READ[2], "W")]
+    return table(title, rows, columns, "speeds")
+
+
+READ = "cage_slip", "pocket_force_max_N", "friction_power_W"
+"""Variables of a data set that the table shows."""
+
+
+def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float) -> list[str]:
+    """The makers' rules for the least load beside the load of a bearing."""
+    like, rating = listed_like(bearing), static_load_rating(bearing)
+    rules = [
+        ("C0/60, with C0 by ISO 76" if like is None else f"C0/60 of {like.designation}", like and like.static_rating)
+    ]
+    rules = [(words, (value or rating) / 60) for words, value in rules]
+    if like is not None:
+        usual, brass = like.minimum_loads(shaft_rpm)
+        rules += [("SKF's rule, usual cage", usual), ("SKF's rule, one-piece brass cage", brass)]
+    rules = [(words, value) for words, value in rules if math.isfinite(value)]
+    below = [words for words, value in rules if load < value]
+    said = "; ".join(f"{value / 1e3:.2g} kN ({words})" for words, value in rules)
+    verdict = f"the load of {load / 1e3:.3g} kN is {'below ' + ' and '.join(below) if below else 'above all of them'}"
+    return [f"Minimum load against skidding at {shaft_rpm:.0f} rpm of the shaft: {said}; {verdict}"]

@@ -1,0 +1,49 @@
+"""The catalogue of bearings against ISO 76, geometry and the paper."""
+
+import math
+
+import numpy as np
+import pytest
+
+from jaxcage.bearing import catalogue, listed, listed_like, nu2310, static_load_rating
+
+
+@pytest.mark.parametrize("name", catalogue())
+def test_rollers_give_the_printed_static_rating(name):
+    """ISO 76 with the rollers of one maker gives the rating that another one prints."""
+    found = listed(name)
+    assert static_load_rating(found.bearing) == pytest.approx(
+        found.static_rating, rel=0.04 if "n_rollers" not in found.estimated else 0.12
+    )
+
+
+@pytest.mark.parametrize("name", catalogue())
+def test_rollers_fit_between_the_raceways(name):
+    """The outer raceway lies outside the guiding shoulder, inside the outer diameter, and rollers do not touch."""
+    b = listed(name).bearing
+    assert float(b.rib_diameter) < float(b.outer_raceway_diameter) < float(b.outside_diameter)
+    chord = float(b.pitch_diameter) * math.sin(math.pi / b.n_rollers) / float(b.roller_diameter)
+    assert 1.15 < chord < 1.55
+    assert float(b.roller_length) < float(b.width)
+
+
+def test_the_bearing_of_the_paper_is_in_it():
+    """Table 1 and the catalogue agree."""
+    found, paper = listed("NU 2310 ECML").bearing, nu2310()
+    assert listed_like(paper).designation == "NU2310"
+    names = "bore outside_diameter width roller_diameter roller_length rib_diameter inner_raceway_diameter".split()
+    assert [float(getattr(found, n)) for n in names] == [float(getattr(paper, n)) for n in names]
+    assert found.n_rollers == paper.n_rollers
+
+
+def test_minimum_load_by_hand():
+    """SKF's rule for NU 2310 at the reference speed: 0.25 (6 + 4) 0.8^2 = 1.6 kN, 1.5 times as much in brass; the load
+    grows by 14/10 from the reference speed to twice that."""
+    found = listed("NU2310")
+    np.testing.assert_allclose(found.minimum_loads(6700.0), (1600.0, 2432.0))
+    np.testing.assert_allclose(found.minimum_loads(13400.0)[0] / 1600.0, 1.4)
+
+
+def test_an_unknown_designation_is_refused():
+    with pytest.raises(ValueError, match="designation.*NU2310.*dimensions"):
+        listed("6204")

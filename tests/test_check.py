@@ -1,0 +1,65 @@
+"""The verdict for an operating range."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import document
+
+import jaxcage as jc
+from jaxcage.design import Ensemble, indices, range_chance
+from jaxcage.files import Range, Unknown
+
+
+def ensemble(chaotic: np.ndarray, failed: np.ndarray | None = None, unknowns: int = 1) -> Ensemble:
+    """Draws with given outcomes at two speeds, 1000 and 2000 rpm; the first unknown grows from draw to draw."""
+    draws = len(chaotic)
+    place = np.stack([(np.arange(draws) + 0.5) / draws, *np.random.default_rng(1).random((unknowns - 1, draws))], 1)
+    lost = np.zeros_like(chaotic) if failed is None else failed
+    known = tuple(Unknown(f"u{i}", (f"u{i}",), Range(0.0, 1.0)) for i in range(unknowns))
+    return Ensemble(known, ("measure it",) * unknowns, place, jc.rpm(1000, 2000, 2), chaotic, lost, 1, 1)
+
+
+def test_probability_of_a_range_is_joint():
+    """Draws chaotic at either speed count, a failed one only if it was chaotic at the other speed."""
+    chaotic, failed = np.zeros((64, 2), bool), np.zeros((64, 2), bool)
+    chaotic[:4, 0] = chaotic[2:8, 1] = True
+    failed[6:10, 0] = True
+    chance, rough = range_chance(ensemble(chaotic, failed), 900, 2100)
+    assert (chance.chaotic, chance.known, chance.draws) == (8, 62, 64)
+    assert chance.share == 1 - 8 / 62 and rough.sum() == 8
+    assert chance.state == "not decided"
+    # Clopper and Pearson, 8 and 10 of 64: scipy.stats.binomtest(k, 64).proportion_ci()
+    assert chance.interval == pytest.approx((1 - 0.2685, 1 - 0.0555), abs=1e-3)
+
+
+def test_an_index_tells_what_decides():
+    """An outcome that one unknown decides alone has index 1 for it, and none for three others."""
+    chaotic = np.repeat((np.arange(128) < 32)[:, None], 2, axis=1)
+    rows = indices(ensemble(chaotic, unknowns=4), chaotic[:, 0])
+    assert [row.label for row in rows if row.telling] == ["u0"]
+    assert rows[0].share > 0.95 and rows[0].quarters == (1.0, 0.0)
+
+
+@pytest.mark.wide
+def test_a_published_case(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """Margins are those of the golden edges of zones 1 and 2; the change that is named helps as much as it says."""
+    found = document(capsys, "check", "1a", "--operating", "12639-17654 rpm cage", "--out", str(tmp_path))
+    assert found["verdict"] in ("calm", "not calm")
+    lower, upper = found["margins"]
+    assert lower["rpm"] == pytest.approx(12355.535, abs=0.01) and upper["rpm"] == pytest.approx(18686.338, abs=0.01)
+    first = found["changes"][0]
+    factor = 1.01 if first["up"] else 0.99
+    name = first["name"]
+    changed = jc.replace(jc.case("1a"), **{name: factor * first["value"]})
+    orbit = jc.periodic_orbit(changed, jc.rpm(13000))
+    edge = jc.bifurcation(changed, "period-doubling", orbit)
+    gain = 100 * (12355.535 - float(edge.speed_rpm)) / 12639
+    assert gain == pytest.approx(first["gain"] / 10, rel=0.1)
+
+
+@pytest.mark.wide
+def test_a_bearing_with_its_rollers(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    found = document(capsys, "check", "nu2310", "--operating", "10000-14000 rpm shaft", "--out", str(tmp_path))
+    assert found["verdict"] in ("calm", "circling", "rattles", "rattles in part")
+    assert [row["rpm"] for row in found["speeds"]] == pytest.approx(np.linspace(10000, 14000, 9))
