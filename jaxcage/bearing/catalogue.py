@@ -49,7 +49,7 @@ class Listed(NamedTuple):
 @functools.cache
 def catalogue() -> dict[str, Listed]:
     """Bearings by designation, such as `NU2310`."""
-    text = importlib.resources.files(__package__).joinpath("catalogue.csv").read_text(encoding="utf-8")
+    text = importlib.resources.files("jaxcage.bearing").joinpath("catalogue.csv").read_text(encoding="utf-8")
     rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
     found = {row["designation"]: _listed(row) for row in rows}
     return found | {"NU2310": found["NU2310"]._replace(bearing=nu2310(), estimated=())}
