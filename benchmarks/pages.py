@@ -90,7 +90,7 @@ BLOCKS: dict[str, tuple[str, str, Part]] = {
     "against-paper": (README, REPRODUCE, against_paper),
     "reproduce-figure": (README, REPRODUCE, figure("reproduce_fig7a.png", "reproduce_7a.png")),
     "speed": (README, "python -m benchmarks", speed),
-    "guide-zones-1a": (EDGE, "jaxcage zones 1a", tables("Synchronous-loss", "Elasticities", *CHAOS)),
+    "guide-zones-1a": (EDGE, "jaxcage zones 1a", tables("Unstable ranges", "Elasticities", *CHAOS)),
     "bifurcations-1a-figure": (EDGE, "jaxcage bifurcations 1a", figure("bifurcations_1a.png")),
     "design-calm": (DESIGN, CALM, answer),
     "design-calm-figure": (DESIGN, CALM, figure("design_1a.png")),

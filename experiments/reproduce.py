@@ -19,13 +19,13 @@ import jaxcage as jc
 from jaxcage.analysis import Zone, Zones, chaotic_share, resolution_rpm
 from jaxcage.bearing import PUBLISHED_CASES, PUBLISHED_SPEED_RANGE_RPM, PublishedCase, load_distribution
 from jaxcage.forces import PocketImpact, approach_speed, impact_history
-from jaxcage.orbits import LossZones, synchronous_orbits
+from jaxcage.orbits import UnstableRanges, synchronous_orbits
 from jaxcage.show import Column, Table, table, zone_span
 
 
 ZONE_RANGE_RPM = (4000.0, 27500.0)
 """Speeds between which a case should have exactly two zones."""
-LASTING, AT_FIRST, LOSS = "lasting", "at first", "synchronous-loss"
+LASTING, AT_FIRST, LOSS = "lasting", "at first", "unstable"
 """Chaos that lasts beyond the horizon; chaos while observed, lasting or not; loss of the synchronous orbit."""
 SECTION_RPM, WIDE_RPM = 8500.0, 500.0  # speed of fig. 9; smallest width of the zones that a diagram shows
 QUICK: dict[str, Any] = {"speeds": 101, "discard": 150, "revolutions": 100, "orbits": False}
@@ -70,7 +70,7 @@ class Runs:
     models: Mapping[str, Any]
     sweeps: Mapping[str, xr.Dataset]
     zones: Mapping[str, Zones]
-    loss: Mapping[str, LossZones]
+    loss: Mapping[str, UnstableRanges]
     """Empty where the orbits were left out."""
 
     def zones_by_kind(self, name: str) -> dict[str, Sequence[Zone]]:
@@ -93,7 +93,7 @@ def run_all(
     found = jc.sweep(list(models.values()), grid, discard=discard, revolutions=revolutions)
     swept = {name: found.isel(design=i) for i, name in enumerate(models)}
     for name, model in models.items() if orbits else ():
-        loss[name] = jc.loss_zones(synchronous_orbits(model, float(grid[0]), float(grid[-1]), settled=swept[name]))
+        loss[name] = jc.unstable_ranges(synchronous_orbits(model, float(grid[0]), float(grid[-1]), settled=swept[name]))
     return Runs(models, swept, {name: jc.zones(s) for name, s in swept.items()}, loss)
 
 

@@ -44,10 +44,10 @@ from .orbits import (
     bifurcation as bifurcation,
     branch as branch,
     curve as curve,
-    loss_zones as loss_zones,
     periodic_orbit as periodic_orbit,
     sensitivity as sensitivity,
     synchronous_orbits as synchronous_orbits,
+    unstable_ranges as unstable_ranges,
 )
 from .solve import (
     Trajectory as Trajectory,

@@ -9,17 +9,17 @@ from helpers import made_sweep
 import jaxcage as jc
 from jaxcage.analysis import zones
 from jaxcage.bearing import PUBLISHED_CASES
-from jaxcage.orbits import Branch, Point, Sensitivity, StableRange, SynchronousOrbits, loss_zones
+from jaxcage.orbits import Branch, Point, Sensitivity, StableRange, SynchronousOrbits, unstable_ranges
 from jaxcage.show import (
     Section,
     drawn,
     elasticity_bars,
-    loss_table,
     motion_tables,
     multiplier_circle,
     orbit_diagram_with_branches,
     settings_table,
     sweep_figure,
+    unstable_table,
 )
 
 
@@ -90,7 +90,9 @@ def sections(name: str = "1a") -> list[Section]:
     """Answers about a design whose zones are known, as a page shows them."""
     model, sweep = jc.case("1a"), swept()
     found, known = orbits(sweep), zones(sweep)
-    edges = [slopes(model, n, p.kind, p.speed_rpm, 0.5 + i) for i, (n, p) in enumerate(loss_zones(found).edges.items())]
+    edges = [
+        slopes(model, n, p.kind, p.speed_rpm, 0.5 + i) for i, (n, p) in enumerate(unstable_ranges(found).edges.items())
+    ]
     figures = {
         "orbits": sweep_figure(sweep, known, PUBLISHED_CASES["1a"]),
         "branches": drawn(lambda ax: orbit_diagram_with_branches(sweep, found.branches, ax)),
@@ -100,7 +102,7 @@ def sections(name: str = "1a") -> list[Section]:
     captions = {key: (figure, f"Figure about {key} of a design") for key, figure in figures.items()}
     beside = ("shaft", 1 / RATIO)
     tables = motion_tables(name, sweep, known, PUBLISHED_CASES["1a"], beside)
-    tables.append(loss_table(name, found, loss_zones(found), None, beside))
+    tables.append(unstable_table(name, found, unstable_ranges(found), None, beside))
     return [
         Section("Zones", ["2 zones of chaos."], captions, tables),
         Section("Settings", tables=[settings_table(sweep, 1.0)]),

@@ -124,7 +124,7 @@ EXIT = 12355.5353
 @pytest.mark.wide
 def test_bifurcations(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     found = document(capsys, "bifurcations", *RANGE, "--count", "8", "--out", str(tmp_path))
-    (point,), (zone,) = found["points"], found["synchronous_loss"]
+    (point,), (zone,) = found["points"], found["unstable_ranges"]
     assert point["kind"] == "period-doubling" and point["speed_rpm"] == pytest.approx(EXIT, abs=2e-3)
     assert point["multiplier"] == pytest.approx([-1.0, 0.0], abs=1e-6)
     assert zone["onset_rpm"] is None and zone["exit_rpm"] == point["speed_rpm"]
@@ -138,7 +138,7 @@ def test_bifurcations(capsys: pytest.CaptureFixture[str], tmp_path: Path):
 def test_zones(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     small = ["--count", "8", "--discard", "50", "--revolutions", "50", "--quick"]
     found = document(capsys, "zones", *RANGE, *small, "--out", str(tmp_path))
-    for zone in (found["zones"][0], found["synchronous_loss"][0]):
+    for zone in (found["zones"][0], found["unstable_ranges"][0]):
         assert zone["exit_rpm"] == pytest.approx(EXIT, abs=2e-3) and zone["exit_mechanism"] == "period-doubling"
     assert load(found["data"])["rpm"].values == pytest.approx(np.linspace(10000, 13500, 8))
     assert found["zones"][0]["published"] == "9100 to 12000"
@@ -149,7 +149,7 @@ def test_report(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     """A page with what the commands say, and verdicts on operating speeds beside the exact edge."""
     small = ["--count", "8", "--discard", "50", "--revolutions", "50", "--quick", "--operating", "11000, 13000"]
     found = document(capsys, "report", *RANGE, *small, "--out", str(tmp_path))
-    inside, clear = (at["synchronous-loss"] for at in found["operating"])
+    inside, clear = (at["unstable"] for at in found["operating"])
     assert inside["state"] == "inside" and inside["edge_rpm"] == pytest.approx(EXIT, abs=2e-3)
     assert clear["percent"] == pytest.approx(100 * (1 - EXIT / 13000), abs=1e-3)
     text = Path(found["report"]).read_text()

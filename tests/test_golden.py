@@ -32,7 +32,7 @@ Numbers = dict[str, list[float]]
 def _edges(case: str) -> Numbers:
     """Exact edges of a case: speed [rpm], elasticities of guidance gap and eccentricity."""
     model = jc.case(case)
-    zones = jc.loss_zones(jc.synchronous_orbits(model, *RANGE))
+    zones = jc.unstable_ranges(jc.synchronous_orbits(model, *RANGE))
     found = {name: jc.sensitivity(model, edge, name) for name, edge in zones.edges.items()}
     assert all(edge.trusted for edge in found.values())
     row = lambda edge: [edge.value_rpm, edge.elasticity["guidance_gap"], edge.elasticity["eccentricity"]]

@@ -191,7 +191,7 @@ def test_synchronous_stretches_end_where_period_one_is_lost():
     stretch = jc.zones(made("11122##q11")).synchronous
     assert [z.exit and z.exit.speed_rpm for z in stretch] == [pytest.approx(5250), None]
     assert all(z.kind == "synchronous" for z in stretch)
-    assert all(e.kind == "synchronous-loss" for z in stretch for e in (z.onset, z.exit) if e)
+    assert all(e.kind == "unstable" for z in stretch for e in (z.onset, z.exit) if e)
 
 
 def test_chaos_that_lasts_and_chaos_that_dies_out_make_zones_of_their_own():

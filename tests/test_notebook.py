@@ -7,7 +7,7 @@ import pytest
 from report_example import orbits, slopes, swept
 
 import jaxcage as jc
-from jaxcage.orbits import loss_zones
+from jaxcage.orbits import unstable_ranges
 
 
 SWEEP = swept()
@@ -15,7 +15,7 @@ FOUND = orbits(SWEEP)
 RESULTS = [
     jc.zones(SWEEP),
     FOUND,
-    loss_zones(FOUND),
+    unstable_ranges(FOUND),
     FOUND.branches[0],
     slopes(jc.case("1a"), "zone 1 onset", "fold", 7000.0, 0.5),
 ]

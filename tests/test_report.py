@@ -14,7 +14,7 @@ from report_example import RATIO, sections, swept
 import jaxcage as jc
 from jaxcage.analysis import Edge, Zone, Zones
 from jaxcage.show import Operating, calmest, page, read_operating
-from jaxcage.show.operating import chaotic_verdict, loss_verdict
+from jaxcage.show.operating import chaotic_verdict, unstable_verdict
 
 
 PER_RPM = np.pi / 30
@@ -75,7 +75,7 @@ def test_verdicts(low: float, high: float, state: str, away: float, percent: flo
     zones = Zones(ZONES, (), 100.0, 500.0)
     for v in (
         chaotic_verdict(Operating(low, high), zones, swept()),
-        loss_verdict(Operating(low, high), ZONES, 2500.0, 27500.0, True),
+        unstable_verdict(Operating(low, high), ZONES, 2500.0, 27500.0, True),
     ):
         assert v.state == state and (v.distance_rpm, v.percent) == pytest.approx((away, percent))
 
@@ -84,7 +84,7 @@ def test_nothing_is_said_of_speeds_that_were_not_swept_or_failed():
     zones, sweep = Zones(ZONES, (), 100.0, 500.0), swept()
     state = lambda low, high, sweep=sweep: chaotic_verdict(Operating(low, high), zones, sweep).state
     assert state(2000.0, 2000.0) == state(15000.0, 28000.0) == "unknown"
-    assert loss_verdict(Operating(15000.0, 28000.0), ZONES, 2500.0, 27500.0, True).state == "unknown"
+    assert unstable_verdict(Operating(15000.0, 28000.0), ZONES, 2500.0, 27500.0, True).state == "unknown"
     lost = sweep["label"].copy()
     lost[125] = "failed"  # 15000 rpm
     broken = sweep.assign(label=lost)
@@ -93,7 +93,7 @@ def test_nothing_is_said_of_speeds_that_were_not_swept_or_failed():
 
 
 def test_calmest_range_is_outside_all_zones():
-    loss = Zone("synchronous-loss", Edge(7000.0, 0.1, "fold"), Edge(19000.0, 0.1, "fold"), 1.0)
+    loss = Zone("unstable", Edge(7000.0, 0.1, "fold"), Edge(19000.0, 0.1, "fold"), 1.0)
     assert calmest(ZONES, 2500.0, 27500.0) == (12000.0, 20000.0)
     assert calmest((*ZONES, loss), 2500.0, 27500.0) == (2500.0, 7000.0) and calmest(ZONES, 21000.0, 27500.0) is None
 
@@ -141,7 +141,7 @@ def test_page_is_well_formed_and_needs_nothing_from_outside(text: str):
 
 def test_page_says_what_was_found(text: str):
     words = " ".join(re.sub(r"<[^>]*>", " ", re.sub(r"<style>.*?</style>", "", text, flags=re.S)).split())
-    assert "Synchronous-loss zones of 1a" in words and f"{12000 / RATIO:.0f}" in words
+    assert "Unstable ranges of the synchronous orbit of 1a" in words and f"{12000 / RATIO:.0f}" in words
     assert "2 zones of chaos." in words and "jaxcage report 1a" in words
 
 

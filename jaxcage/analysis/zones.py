@@ -3,8 +3,8 @@
 Two kinds of edge are never mixed. A **chaotic edge** is the end of a run of chaotic speeds, after windows narrower than
 a stated width are closed: it is statistical, and no more certain than the grid. Chaos that lasts beyond the horizon of
 the sweep and chaos that dies out before it make zones of their own; between these an edge is no more certain than the
-mean lives next to it, which may be on either side of the horizon within their errors. A **synchronous-loss edge** is
-where the stable period-1 orbit appears or disappears; a sweep only brackets it between two neighbouring speeds.
+mean lives next to it, which may be on either side of the horizon within their errors. An **edge of an unstable range**
+is where the stable period-1 orbit appears or disappears; a sweep only brackets it between two neighbouring speeds.
 """
 
 import dataclasses
@@ -37,7 +37,7 @@ class Edge:
     speed_rpm: float
     uncertainty_rpm: float
     kind: str
-    """`chaotic`, `transient` or `synchronous-loss`."""
+    """`chaotic`, `transient` or `unstable`."""
     mechanism: str = "unknown"
     """`period-doubling`, `Neimark-Sacker`, `fold` or `unknown`."""
     basis: str = "statistical"
@@ -77,7 +77,7 @@ class Zone:
     """A range of speed; an edge is None where the zone runs past the swept range."""
 
     kind: str
-    """`chaotic`, `transient`, `synchronous-loss`, or `synchronous` for a stretch in which the stable period-1 orbit was
+    """`chaotic`, `transient`, `unstable`, or `synchronous` for a stretch in which the stable period-1 orbit was
     met."""
     onset: Edge | None
     exit: Edge | None
@@ -102,7 +102,7 @@ class Zones:
     zones: tuple[Zone, ...]
     """Zones of chaos that lasts, ascending."""
     synchronous: tuple[Zone, ...]
-    """Stretches in which a stable period-1 orbit was met; their ends are synchronous-loss edges."""
+    """Stretches in which a stable period-1 orbit was met; their ends are edges of unstable ranges."""
     resolution_rpm: float
     close_below_rpm: float
     transient: tuple[Zone, ...] = ()
@@ -181,7 +181,7 @@ def _first(mask: Bool[np.ndarray, " speeds"], index: int, step: int) -> int:
 
 def _zones(found: xr.Dataset, at: _Speeds, spans: Sequence[tuple[int, int]], kind: str) -> tuple[Zone, ...]:
     followed = kind != "synchronous" and "escape" in found
-    edges = kind if kind != "synchronous" else "synchronous-loss"
+    edges = kind if kind != "synchronous" else "unstable"
     rpm, chaotic = found["rpm"].values, restless(found)
     return tuple(
         Zone(

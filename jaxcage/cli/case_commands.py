@@ -118,7 +118,7 @@ def report(
         ends, told = (float(speeds[0]), float(speeds[-1])), {"method": run.method, "progress": tell}
         orbits = jc.orbits.synchronous_orbits(subject.model, *ends, settled=found, **told)
         answer, zones, slopes = explained(subject, found, orbits, answer, quick, run.method)
-        loss = jc.loss_zones(orbits).zones
+        loss = jc.unstable_ranges(orbits).zones
         parts = [("Zones", answer), *_of_orbits(subject, ends, orbits, slopes, quick, run.method)]
         if calm := jc.show.calmest((*zones.zones, *zones.transient, *loss), *limits):
             said.append(f"The widest range outside all zones goes from {calm[0]:.0f} to {calm[1]:.0f} rpm.")
@@ -171,7 +171,7 @@ def _of_orbits(
     subject: Subject, ends: tuple[float, float], orbits: Any, slopes: dict[str, Any], quick: bool, method: Any
 ) -> list[tuple[str, Answer]]:
     """Synchronous orbits, a map over speed and guidance gap, and elasticities of edges."""
-    found, loss, axis = [], jc.loss_zones(orbits), jc.show.parameter_axis(subject.model, "guidance_gap")
+    found, loss, axis = [], jc.unstable_ranges(orbits), jc.show.parameter_axis(subject.model, "guidance_gap")
     if orbits.branches:
         found.append(("The synchronous orbit", of_orbits(subject, orbits, loss)))
     edges = {} if quick else {name: edge for name, edge in loss.edges.items() if name in FOLLOWED}

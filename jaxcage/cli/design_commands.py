@@ -218,7 +218,7 @@ def sensitivity(
         slopes = [(found.statistics[of], directions)]
         files["figure"] = jc.show.statistic_bars(found, f"{name}: elasticities")
     elif not quick:
-        loss = jc.loss_zones(jc.orbits.synchronous_orbits(model, *subject.ends(over), progress=report))
+        loss = jc.unstable_ranges(jc.orbits.synchronous_orbits(model, *subject.ends(over), progress=report))
         edges = [s for s in jc.orbits.sensitivities(model, loss.edges).values() if s.trusted]
         slopes = [(s, _not_fixed(model, s.elasticity)) for s in edges]
         files |= {"figure": bars(subject, edges)} if edges else {}

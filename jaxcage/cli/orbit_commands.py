@@ -46,12 +46,12 @@ def explained(
 ) -> tuple[Answer, Any, dict[str, Any]]:
     """The answer about a sweep with the mechanisms of its zones and the zones without a stable synchronous orbit; the
     chaotic zones; and the sensitivities of exact edges."""
-    name, beside, loss = subject.name, subject.beside, jc.loss_zones(orbits)
+    name, beside, loss = subject.name, subject.beside, jc.unstable_ranges(orbits)
     known = jc.orbits.explain(jc.zones(found), orbits, subject.model, method)
     slopes = {} if quick else jc.show.edge_slopes(subject.model, loss, known, method)
     tables = [
         *jc.show.motion_tables(name, found, known.zones, subject.published, beside),
-        jc.show.loss_table(name, orbits, loss, subject.published, beside),
+        jc.show.unstable_table(name, orbits, loss, subject.published, beside),
         *([jc.show.elasticities_table(name, slopes, beside)] if slopes else []),
     ]
     notes = [*jc.show.source_notes(known), *jc.show.unsettled_notes(orbits), *answer.notes]
@@ -67,7 +67,7 @@ def _searched(subject: Subject, over: o.Range, discard: int | None, method: Any,
     length: dict[str, Any] = {name: x for name, x in (("count", over.count), ("discard", discard)) if x is not None}
     told = {"method": method, "progress": report}
     found = jc.orbits.synchronous_orbits(subject.model, *subject.ends(over), **length, **told)
-    between, loss = f"between {found.lower_rpm:g} and {found.upper_rpm:g} rpm", jc.loss_zones(found)
+    between, loss = f"between {found.lower_rpm:g} and {found.upper_rpm:g} rpm", jc.unstable_ranges(found)
     if not found.branches:
         jc.show.require_some(found.sweep, f" {between}")
         what = f"No simulation {between} settled on a synchronous orbit"
@@ -106,7 +106,7 @@ def of_orbits(subject: Subject, found: Any, loss: Any) -> Answer:
         "data": jc.show.branch_columns(found.branches),
     }
     tables = [
-        jc.show.loss_table(name, found, loss, subject.published, beside),
+        jc.show.unstable_table(name, found, loss, subject.published, beside),
         jc.show.stretch_table(name, found, beside),
         jc.show.edge_table(found, loss, beside),
     ]
@@ -168,7 +168,7 @@ def gradient(
     each = [*([jc.orbits.width(ends[0], ends[1], "zone 1 width")] if all(ends) else []), *trusted.values()]
     tables = [
         jc.show.elasticities_table(name, edges, subject.beside),
-        jc.show.width_table(f"Widths of the synchronous-loss zones of {name}", edges, jc.show.FIRST),
+        jc.show.width_table(f"Widths of the unstable ranges of {name}", edges, jc.show.FIRST),
         *(jc.show.gradient_table(name, model, s) for s in each),
     ]
     edge, slope = max(trusted.items(), key=lambda item: abs(item[1].elasticity["guidance_gap"]))

@@ -27,11 +27,11 @@ from ..orbits import (
     StableRange,
     branch,
     follow_all,
-    loss_zones,
     orbit_slopes,
     periodic_orbit,
     stable_range,
     synchronous_orbits,
+    unstable_ranges,
 )
 from ..solve import REVOLUTION, AbstractMethod, FixedSteps, strobe_map
 from .design_space import DesignSpace, Value
@@ -230,7 +230,7 @@ class UnstableWidth(_AroundEdges):
     """
 
     def _first(self) -> _Anchor:
-        found = loss_zones(synchronous_orbits(self.space.system, *self.operating))
+        found = unstable_ranges(synchronous_orbits(self.space.system, *self.operating))
         if not found.edges:
             raise InputError("The range of speed must have an edge of an unstable range within it, but has none.")
         return _Anchor(self.space.place, found.edges)

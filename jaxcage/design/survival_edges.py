@@ -159,7 +159,7 @@ SolvedEdge = LastingEdge | Sensitivity
 
 @dataclasses.dataclass(frozen=True)
 class ZoneWidth(Slopes):
-    """Width of a zone [rpm], of lasting chaos or of synchronous loss, exit less onset, and its slopes.
+    """Width of a zone [rpm], of lasting chaos or an unstable range, exit less onset, and its slopes.
 
     Each edge has an error of its own; the gradient of an exact edge has none. A zone that is cut by the range is open:
     its width is NaN, and its slopes are those of its one edge. It is trusted if all edges that it has are converged;

@@ -13,7 +13,7 @@
 | `bifurcation`     | Newton's method for bifurcation points                                              |
 | `curves`          | curves of bifurcation points in two parameters; edges from one design to another    |
 | `search`          | search for orbits without a hint of where they are                                  |
-| `unstable_ranges` | unstable ranges of the synchronous orbit; mechanisms of chaotic edges               |
+| `unstable`        | unstable ranges of the synchronous orbit; mechanisms of chaotic edges               |
 | `gradient`        | derivatives and elasticities of edges, derivatives of orbits and multipliers        |
 """
 
@@ -54,16 +54,16 @@ from .search import (
     synchronous_orbits as synchronous_orbits,
 )
 from .step_control import StepControl as StepControl
-from .unstable_ranges import (
+from .unstable import (
     Explained as Explained,
-    LossZones as LossZones,
+    UnstableRanges as UnstableRanges,
     explain as explain,
-    loss_zones as loss_zones,
+    unstable_ranges as unstable_ranges,
 )
 
 
 check_layer(
     globals(),
     "bifurcation branch cascade curve "
-    "explain follow loss_zones periodic_orbit sensitivities sensitivity stable_range synchronous_orbits",
+    "explain follow unstable_ranges periodic_orbit sensitivities sensitivity stable_range synchronous_orbits",
 )

@@ -179,7 +179,7 @@ def limit_sensitivity(
 
 def width(onset: Sensitivity, exit_: Sensitivity, name: str = "width") -> Sensitivity:
     """Return the sensitivity of the width between two edges."""
-    return _combined(name, "synchronous-loss", ((1.0, exit_), (-1.0, onset)))
+    return _combined(name, "unstable", ((1.0, exit_), (-1.0, onset)))
 
 
 def _combined(name: str, kind: str, parts: Sequence[tuple[float, Sensitivity]]) -> Sensitivity:

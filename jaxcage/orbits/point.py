@@ -206,7 +206,7 @@ class Point(eqx.Module):
         return "converged" if outcome == Outcome.FOUND else outcome.name.lower().replace("_", " ")
 
     def as_edge(self, kind: str) -> Edge:
-        """Return it as the edge of a zone, which is `chaotic` or `synchronous-loss`."""
+        """Return it as the edge of a zone, which is `chaotic` or `unstable`."""
         return Edge(float(self.speed_rpm), float(self.error_rpm), kind, self.kind, "located")
 
     def __str__(self) -> str:

@@ -133,12 +133,12 @@ from .verdict_tables import (
 from .zone_tables import (
     coexisting_notes as coexisting_notes,
     edge_table as edge_table,
-    loss_table as loss_table,
     motion_tables as motion_tables,
     point_record as point_record,
     require_some as require_some,
     stretch_table as stretch_table,
     unsettled_notes as unsettled_notes,
+    unstable_table as unstable_table,
     zone_span as zone_span,
     zone_words as zone_words,
 )

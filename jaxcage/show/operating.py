@@ -98,8 +98,10 @@ def chaotic_verdict(at: Operating, zones: Zones, sweep: xr.Dataset) -> Verdict:
     return Verdict("unknown", f"{lost} simulations beside it failed: nothing is known") if lost else found
 
 
-def loss_verdict(at: Operating, zones: Sequence[Zone], lower_rpm: float, upper_rpm: float, any_orbit: bool) -> Verdict:
-    """Place of `at` among the synchronous-loss zones of a search from `lower_rpm` to `upper_rpm`."""
+def unstable_verdict(
+    at: Operating, zones: Sequence[Zone], lower_rpm: float, upper_rpm: float, any_orbit: bool
+) -> Verdict:
+    """Place of `at` among the unstable ranges of a search from `lower_rpm` to `upper_rpm`."""
     if not any_orbit:
         return Verdict("unknown", "no synchronous orbit was found: nothing is known")
     return _beyond(at, np.array([lower_rpm, upper_rpm])) or _verdict(at, zones)
@@ -132,7 +134,7 @@ def assess(
         each = {"chaotic": chaotic_verdict(at, found, sweep)}
         if orbits is not None:
             searched = orbits.lower_rpm, orbits.upper_rpm, bool(orbits.stretches)
-            each = {"synchronous-loss": loss_verdict(at, loss, *searched)} | each
+            each = {"unstable": unstable_verdict(at, loss, *searched)} | each
         verdicts.append((at, each))
     return verdicts
 

@@ -8,7 +8,7 @@ from typing import Any
 from .._parameters import EXTRA, parameter_info, parameters
 from ..design import LastingEdge, MeanGradient, SolvedEdge, ZoneWidth, zone_width
 from ..models import AbstractForcedSystem
-from ..orbits import Cascade, Explained, LossZones, Sensitivity, limit_sensitivity, sensitivities, sensitivity
+from ..orbits import Cascade, Explained, Sensitivity, UnstableRanges, limit_sensitivity, sensitivities, sensitivity
 from ..solve import AbstractMethod
 from .tables import Beside, Column, Table, chosen, number, speed_columns, table
 
@@ -35,9 +35,9 @@ def to_be_turned(model: AbstractForcedSystem, slopes: Iterable[Sensitivity]) -> 
 
 
 def edge_slopes(
-    model: Any, loss: LossZones, explained: Explained, method: AbstractMethod | None
+    model: Any, loss: UnstableRanges, explained: Explained, method: AbstractMethod | None
 ) -> dict[str, Sensitivity]:
-    """Sensitivities of the synchronous-loss edges, and of chaotic edges that coincide with something exact."""
+    """Sensitivities of the edges of unstable ranges, and of chaotic edges that coincide with something exact."""
     slopes = sensitivities(model, loss.edges, method)
     for name, source in explained.sources.items():
         of: Any = limit_sensitivity if isinstance(source, Cascade) else sensitivity

@@ -10,7 +10,7 @@ import xarray as xr
 from .._errors import NoResult
 from ..analysis import Stretch as Motion, Zone, Zones, failed, lives_in_words, outcomes
 from ..bearing import PublishedCase
-from ..orbits import LossZones, Point, StableRange, SynchronousOrbits
+from ..orbits import Point, StableRange, SynchronousOrbits, UnstableRanges
 from .tables import Beside, Column, Table, chosen, number, speed_columns, table
 
 
@@ -84,13 +84,13 @@ def motion_tables(
     ]
 
 
-def loss_table(
-    name: str, found: SynchronousOrbits, loss: LossZones, published: PublishedCase | None, beside: Beside = None
+def unstable_table(
+    name: str, found: SynchronousOrbits, loss: UnstableRanges, published: PublishedCase | None, beside: Beside = None
 ) -> Table:
     """Zones without a stable synchronous orbit, each published (chaotic) zone beside the one it shares most with."""
-    title = f"Synchronous-loss zones of {name} [rpm], closed below {loss.close_below_rpm:.0f} rpm"
+    title = f"Unstable ranges of the synchronous orbit of {name} [rpm], closed below {loss.close_below_rpm:.0f} rpm"
     between = found.lower_rpm, found.upper_rpm
-    return _beside_published(title, "synchronous_loss", loss.zones, published, between, beside)
+    return _beside_published(title, "unstable_ranges", loss.zones, published, between, beside)
 
 
 def _beside_published(
@@ -182,7 +182,7 @@ def _stretch_record(stretch: StableRange, found: SynchronousOrbits) -> dict[str,
     return record
 
 
-def edge_table(found: SynchronousOrbits, loss: LossZones, beside: Beside = None) -> Table:
+def edge_table(found: SynchronousOrbits, loss: UnstableRanges, beside: Beside = None) -> Table:
     """Bifurcations at which a stable synchronous orbit begins or ends."""
     names = {id(point): name for name, point in loss.edges.items()}
     rows = [point_record(p, found, names.get(id(p))) for p in found.edges]
@@ -210,7 +210,7 @@ def unsettled_notes(found: SynchronousOrbits) -> list[str]:
     return notes
 
 
-def coexisting_notes(loss: LossZones) -> list[str]:
+def coexisting_notes(loss: UnstableRanges) -> list[str]:
     """One line for each named edge at whose speed another synchronous orbit is stable."""
     notes = []
     for name, orbits in loss.coexisting.items():

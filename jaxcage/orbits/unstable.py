@@ -33,7 +33,7 @@ CASCADE_LEVELS = 4
 
 
 @dataclasses.dataclass(frozen=True)
-class LossZones:
+class UnstableRanges:
     """Unstable ranges of the synchronous orbit between two speeds, ascending.
 
     An edge is None if a range goes on beyond the speeds that were searched. `edges` has them by name, `zone 1 onset`,
@@ -90,7 +90,7 @@ def _joined(groups: Sequence[_Group], close: float) -> list[_Group]:
         groups = [g for g in groups if g is not a and g is not b] + [_group(*a.stretches, *b.stretches)]
 
 
-def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -> LossZones:
+def unstable_ranges(found: SynchronousOrbits, close_below_rpm: float | None = None) -> UnstableRanges:
     """Return the unstable ranges of the synchronous orbit, between the stable stretches that were found.
 
     **Arguments:** result of `synchronous_orbits`; width below which windows and stretches are closed [rpm], by default
@@ -98,7 +98,7 @@ def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -
     """
     close_below_rpm = closing_width(found.sweep["rpm"].values) if close_below_rpm is None else close_below_rpm
     if not found.stretches:
-        return LossZones((), {}, {}, None, close_below_rpm)
+        return UnstableRanges((), {}, {}, None, close_below_rpm)
     principal = max(found.stretches, key=lambda s: (s.met_first, s.met, s.width_rpm))
     own = _joined([_group(s) for s in found.stretches if s.family == principal.family], close_below_rpm)
     first = next(g for g in own if principal in g.stretches)
@@ -108,7 +108,7 @@ def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -
     groups.sort(key=lambda g: g.low.lower_rpm)
     tops = [None, *(g.high for g in groups)]
     bottoms = [*(g.low for g in groups), None]
-    edge = lambda point: None if point is None else point.as_edge("synchronous-loss")
+    edge = lambda point: None if point is None else point.as_edge("unstable")
     zones: list[Zone] = []
     edges: dict[str, Point] = {}
     for before, after in zip(tops, bottoms, strict=True):
@@ -118,12 +118,12 @@ def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -
         open_above = after is None and before is not None and found.upper_rpm - before.upper_rpm < close_below_rpm
         if open_below or open_above or (before is not None and onset is None):
             continue
-        zones.append(Zone("synchronous-loss", edge(onset), edge(leaves), _share(found, onset, leaves)))
+        zones.append(Zone("unstable", edge(onset), edge(leaves), _share(found, onset, leaves)))
         for name, point in (("onset", onset), ("exit", leaves)):
             if point is not None:
                 edges[f"zone {len(zones)} {name}"] = point
     coexisting = {name: found.coexisting(float(p.speed)) for name, p in edges.items()}
-    return LossZones(tuple(zones), edges, coexisting, principal, close_below_rpm)
+    return UnstableRanges(tuple(zones), edges, coexisting, principal, close_below_rpm)
 
 
 def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) -> float:

@@ -94,17 +94,17 @@ LAYOUTS = {
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_zones_are_what_is_left_between_the_stretches(name):
     stretches, expected = LAYOUTS[name]
-    result = jc.loss_zones(found(*stretches))
+    result = jc.unstable_ranges(found(*stretches))
     assert ends(result) == [tuple(None if e is None else float(e) for e in pair) for pair in expected]
     assert result.close_below_rpm == 500.0
     names = [f"zone {i} {end}" for i, pair in enumerate(expected, 1) for end, e in zip(("onset", "exit"), pair) if e]
     assert list(result.edges) == names and list(result.coexisting) == names
     for zone in result.zones:
-        assert zone.kind == "synchronous-loss"
+        assert zone.kind == "unstable"
         if zone.onset is not None:
             assert zone.onset.mechanism == "Neimark-Sacker" and zone.onset.basis == "located"
         if zone.exit is not None:
-            assert zone.exit.mechanism == "fold" and zone.exit.kind == "synchronous-loss"
+            assert zone.exit.mechanism == "fold" and zone.exit.kind == "unstable"
         for edge in (zone.onset, zone.exit):
             assert edge is None or 0 < edge.uncertainty_rpm < 0.01
     if not stretches:
@@ -115,14 +115,14 @@ def test_principal_stretch_is_the_one_of_the_conventional_start():
     """The first start decides; then all of them; then the width. What overlaps the principal one only coexists."""
     long = stretch(2000, 9000, family=0, met=40, first=5, open_below=True)
     usual = stretch(8000, 12000, family=1, met=20, first=15)
-    result = jc.loss_zones(found(long, usual, ABOVE))
+    result = jc.unstable_ranges(found(long, usual, ABOVE))
     assert result.principal == usual
     assert ends(result) == [(None, 8000.0), (12000.0, 15000.0)]
     tied = stretch(2000, 9000, family=0, met=40, first=15, open_below=True)
-    result = jc.loss_zones(found(tied, usual, ABOVE))
+    result = jc.unstable_ranges(found(tied, usual, ABOVE))
     assert result.principal == tied and ends(result) == [(9000.0, 15000.0)]
     narrow = stretch(8000, 8900, family=1, met=40, first=15)
-    assert jc.loss_zones(found(tied, narrow, ABOVE)).principal == tied
+    assert jc.unstable_ranges(found(tied, narrow, ABOVE)).principal == tied
 
 
 def chaotic(onset=None, leaves=None, uncertainty=100.0):
@@ -178,7 +178,7 @@ def test_an_exit_is_taken_from_the_limit_of_a_cascade_that_ends_within_its_uncer
         asked.append((point.speed_rpm, lower / PER_RPM, upper / PER_RPM))
         return jc.orbits.Cascade((point,), limit * PER_RPM, 2.0 * PER_RPM)
 
-    monkeypatch.setattr("jaxcage.orbits.unstable_ranges.cascade", planted)
+    monkeypatch.setattr("jaxcage.orbits.unstable.cascade", planted)
     above = stretch(6700, 9000, kinds=("period-doubling", "fold"))
     result = explained(chaotic(None, 6300), above)
     np.testing.assert_allclose(asked, [(6700, 5700, 7700)])
