@@ -78,7 +78,8 @@ def precision(sample: Problem, rivals: Sequence[Rival]) -> tuple[dict[str, dict[
     text = (
         "## Work and precision\n\n"
         f"Error of the one-revolution map, max(|dx|, |dy|) / c, over {sample.speeds.size} states on the attractors "
-        f"from {FIRST_RPM:.0f} to {LAST_RPM:.0f} rpm, three starts in turn. Reference: Rodas4 with {REFERENCE} steps. "
+        f"from {FIRST_RPM:.0f} to {LAST_RPM:.0f} rpm, three initial states in turn. "
+        f"Reference: Rodas4 with {REFERENCE} steps. "
         "Microseconds per revolution and lane are those of the quickest of up to five calls.\n\n"
         f"{markdown(['rival', 'setting', 'median', '99 %', 'us'], body)}\n\n"
         "That they solve the same equations: largest distance from the reference when tight, over the clearance.\n\n"
@@ -128,8 +129,8 @@ def plain(
 
 def extras(problem: Problem) -> str:
     """Exponents along with ten revolutions beside plain revolutions of the same lanes."""
-    turns, starts = 10, problem.states[:, None]
-    settings: dict[str, Any] = dict(starts=starts, discard=0, revolutions=turns, blocks=1, keep=1)
+    turns, initial_states = 10, problem.states[:, None]
+    settings: dict[str, Any] = dict(initial_states=initial_states, discard=0, revolutions=turns, blocks=1, keep=1)
     swept = lambda k: jc.sweep(problem.model, problem.speeds, exponents=k, **settings)["last"]
     runs = {
         "plain revolution": (turns, lambda: swept(0)),

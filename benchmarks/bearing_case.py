@@ -81,7 +81,7 @@ def arcs(model: jc.BearingModel, rpm: float, start: tuple[float, ...]) -> dict[s
 
 
 def statistics(found: xr.Dataset, load: float) -> list[dict[str, Any]]:
-    """Means with standard errors at every speed, from all starts."""
+    """Means with standard errors at every speed, from all initial states."""
     rows = []
     for i, rpm in enumerate(found["rpm"].values):
         row: dict[str, Any] = {"shaft_speed_rpm": round(float(rpm), 6), "load_N": load}
@@ -105,7 +105,7 @@ def made(discard: int, revolutions: int) -> dict[str, Any]:
     """The whole file."""
     model = jc.whole_bearing("nu2310")
     models = [jc.replace(model, load=load) for load in LOADS]
-    length: dict[str, Any] = dict(starts=STARTS, discard=discard, revolutions=revolutions, blocks=BLOCKS)
+    length: dict[str, Any] = dict(initial_states=STARTS, discard=discard, revolutions=revolutions, blocks=BLOCKS)
     swept = jc.sweep(models, np.array([jc.rpm(rpm) for rpm in SPEEDS]), **length)
     sweeps = [swept.isel(design=i) for i in range(len(models))]
     trajectories = []
@@ -122,7 +122,7 @@ def made(discard: int, revolutions: int) -> dict[str, Any]:
         "constants": constants(model),
         "arcs": trajectories,
         "statistics": {
-            "starts": STARTS,
+            "initial_states": STARTS,
             "discard": discard,
             "revolutions": revolutions,
             "at": [row for load, sweep in zip(LOADS, sweeps, strict=True) for row in statistics(sweep, load)],

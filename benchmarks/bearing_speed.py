@@ -1,12 +1,12 @@
 """`python -m benchmarks.bearing_speed`: how long a sweep of the whole bearing takes, and what others take for the same.
 
-The aim: 100 shaft speeds from 4000 to 16000 rpm, 3 starts, 300 revolutions of the cage, NU2310 at 4450 N, with slips,
-forces and the largest exponent, in 15 minutes on two cores. By default every second speed is run, fewer revolutions
-long, in chunks of as many lanes as the whole has; `--whole` runs all of it. Beside it stand two that do the same arcs
-of a sixteenth of a revolution, without forces, exponent and control of the error: plain Runge-Kutta steps in C, and
-SciPy on the second implementation in NumPy. Errors are those reached at the end of an arc, in units of the state's
-scale, against the C program with far shorter steps, which is held against SciPy's DOP853. Processor time counts all
-threads: other jobs on the machine change it less than wall time.
+The aim: 100 shaft speeds from 4000 to 16000 rpm, 3 initial states, 300 revolutions of the cage, NU2310 at 4450 N, with
+slips, forces and the largest exponent, in 15 minutes on two cores. By default every second speed is run, fewer
+revolutions long, in chunks of as many lanes as the whole has; `--whole` runs all of it. Beside it stand two that do the
+same arcs of a sixteenth of a revolution, without forces, exponent and control of the error: plain Runge-Kutta steps in
+C, and SciPy on the second implementation in NumPy. Errors are those reached at the end of an arc, in units of the
+state's scale, against the C program with far shorter steps, which is held against SciPy's DOP853. Processor time counts
+all threads: other jobs on the machine change it less than wall time.
 """
 
 import argparse
@@ -135,7 +135,7 @@ def arcs(model: jc.BearingModel, speeds: np.ndarray) -> tuple[Any, ...]:
 def show_sweep(model: jc.BearingModel, speeds: np.ndarray, discard: int, revolutions: int) -> None:
     """Run the sweep twice, first to compile, and say what it took and what the whole would take."""
     run = lambda discard, revolutions, blocks: jc.sweep(
-        model, speeds, starts=STARTS, discard=discard, revolutions=revolutions, blocks=blocks
+        model, speeds, initial_states=STARTS, discard=discard, revolutions=revolutions, blocks=blocks
     )
     run(1, 1, 1)
     found, wall, processor = measured(lambda: run(discard, revolutions, revolutions // BLOCK))

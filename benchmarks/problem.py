@@ -47,7 +47,7 @@ def _begin() -> None:
 
 
 def make_problem(lanes: int) -> Problem:
-    """Lanes over the case's speeds, the model's three starts taken in turn, each run onto its attractor.
+    """Lanes over the case's speeds, the model's three initial states taken in turn, each run onto its attractor.
 
     Some attractors reach past the clearance circle, which the contact allows but `sweep` does not as a start: of a few
     more lanes than asked for those inside are kept.
@@ -55,10 +55,10 @@ def make_problem(lanes: int) -> Problem:
     _begin()
     model = jc.case(CASE, "preliminary")
     speeds = jc.rpm(FIRST_RPM, LAST_RPM, lanes + lanes // 64 + 8)
-    table = jax.vmap(lambda s: jnp.stack([jnp.stack(y) for y in model.starts(s)]))
-    starts = np.asarray(table(jnp.asarray(speeds)))
+    table = jax.vmap(lambda s: jnp.stack([jnp.stack(y) for y in model.initial_states(s)]))
+    initial_states = np.asarray(table(jnp.asarray(speeds)))
     turn = np.arange(speeds.size)
-    first = Problem(model, speeds, starts[turn, turn % starts.shape[1]])
+    first = Problem(model, speeds, initial_states[turn, turn % initial_states.shape[1]])
     states = our_map(first, None, TRANSIENT)
     if not np.all(np.isfinite(states)):
         raise RuntimeError(f"{np.sum(~np.isfinite(states[:, 0]))} lanes failed on the way to their attractors.")
@@ -92,7 +92,7 @@ def our_map(problem: Problem, method: jc.solve.AbstractMethod | None, revolution
     return jc.sweep(
         problem.model,
         problem.speeds,
-        starts=problem.states[:, None],
+        initial_states=problem.states[:, None],
         discard=0,
         revolutions=revolutions,
         blocks=1,

@@ -56,7 +56,7 @@ def beside(model: jc.CageModel, rpm: float, state: np.ndarray, method: Any = Non
     """The growth from a state by the package and by the reference; None where this does not finish."""
     speed = float(jc.rpm(rpm))
     options = dict(discard=0, revolutions=REVOLUTIONS, blocks=REVOLUTIONS, method=method, confirm=False, horizon=0)
-    ours = jc.sweep(model, speed, starts=state[None, None], **options)  # pyright: ignore[reportArgumentType]
+    ours = jc.sweep(model, speed, initial_states=state[None, None], **options)  # pyright: ignore[reportArgumentType]
     if failed(ours)[0, 0]:  # as a start beyond the clearance is
         return None
     along = [float(c) for c in start_tangents(state.size, 1)[0]]

@@ -1,8 +1,8 @@
 """Labels of the default sweep beside those of 8 times the steps: no speed is chaotic for one and calm for the other.
 
 But for transients: where chaos ends after a time that is as long as a lane is followed, which lanes are still chaotic
-is chance. Such a speed is explained if many perturbed starts leave chaos at the same rate by both, and some have left
-by then and some have not.
+is chance. Such a speed is explained if many perturbed initial states leave chaos at the same rate by both, and some
+have left by then and some have not.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,7 +18,7 @@ from .truth_models import Subject, by_kind, fine, pair
 
 
 STARTS = 2
-"""A speed is chaotic if as many starts are."""
+"""A speed is chaotic if as many initial states are."""
 PERTURBED = 36
 """Starts from which the escape rate is measured, where two labels differ."""
 SPREAD = 0.02
@@ -51,7 +51,7 @@ class Doubted(NamedTuple):
     spurious: bool
     """Chaotic by the default; else by the finer steps."""
     rates: tuple[Survival, Survival]
-    """Escapes of perturbed starts by both."""
+    """Escapes of perturbed initial states by both."""
 
     @property
     def explained(self) -> bool:
@@ -67,18 +67,18 @@ class Doubted(NamedTuple):
 
 
 def perturbed(subject: Subject, speed: float) -> np.ndarray:
-    """States about the model's own starts in turn, shape (1, starts, dimension)."""
-    own = np.array([[float(c) for c in y] for y in subject.model.starts(speed)])
+    """States about the model's own initial states in turn, shape (1, initial states, dimension)."""
+    own = np.array([[float(c) for c in y] for y in subject.model.initial_states(speed)])
     scale = np.array([float(c) for c in subject.model.scale(speed)])
     drawn = np.random.default_rng(subject.seed).normal(scale=SPREAD, size=(PERTURBED, own.shape[1]))
     return (np.resize(own, drawn.shape) + drawn * scale)[None]
 
 
 def escapes(subject: Subject, speed: float, method: Any = None) -> Any:
-    """`Survival` of perturbed starts to the length of a default sweep."""
+    """`Survival` of perturbed initial states to the length of a default sweep."""
     length = LENGTH - SETTLED
     options = dict(discard=SETTLED, revolutions=length, blocks=length // LIFE_BLOCK, confirm=False, horizon=LENGTH + 1)
-    found = jc.sweep(subject.model, speed, starts=perturbed(subject, speed), method=method, **options)  # pyright: ignore
+    found = jc.sweep(subject.model, speed, initial_states=perturbed(subject, speed), method=method, **options)  # pyright: ignore
     times = np.maximum(found["escape"].values.ravel() - SETTLED, 0.0)
     return survival(times, length, block=LIFE_BLOCK)
 

@@ -14,7 +14,7 @@ from .truth_models import Subject, by_kind
 
 
 SPEEDS = 5
-"""Of each model, with two starts each: ten lanes from a start, and as many of them as finish once they have settled."""
+"""Lanes of each model from two initial states: ten from the beginning, and those that finish once they have settled."""
 SETTLING = 60
 """Revolutions before a state counts as settled."""
 CERTAIN = 1e-4
@@ -81,7 +81,7 @@ class Lane(NamedTuple):
 
 def states(model: jc.CageModel, speeds: np.ndarray, seed: int) -> np.ndarray:
     """The paper's start and a random one inside the clearance at every speed, shape (speeds, 2, dimension)."""
-    paper = [[float(c) for c in model.starts(speed)[0]] for speed in speeds]
+    paper = [[float(c) for c in model.initial_states(speed)[0]] for speed in speeds]
     fields = [reference.field(model, float(speed)) for speed in speeds]
     inside = [reference.random_state(100 * seed + i, f, 0.9 * f.land["onset"]) for i, f in enumerate(fields)]
     return np.stack([np.array(paper), np.array(inside)], axis=1)
@@ -99,33 +99,39 @@ def truth(field: reference.Field, start: np.ndarray, sharper: float = 1.0) -> tu
     return exact.strobe[-1], NOISE * exact.spread, exact.peak
 
 
-def compare(of: str, model: jc.CageModel, speeds: np.ndarray, starts: np.ndarray) -> list[Lane]:
+def compare(of: str, model: jc.CageModel, speeds: np.ndarray, initial_states: np.ndarray) -> list[Lane]:
     """One revolution of every state."""
-    found = jc.sweep(model, speeds, starts=starts, discard=0, revolutions=1, exponents=0, blocks=1, keep=1)
+    found = jc.sweep(
+        model, speeds, initial_states=initial_states, discard=0, revolutions=1, exponents=0, blocks=1, keep=1
+    )
 
     def beside(i: int, j: int, sharper: float = 1.0) -> Lane:
         field = reference.field(model, float(speeds[i]))
-        end, noise, peak = truth(field, starts[i, j], sharper)
+        end, noise, peak = truth(field, initial_states[i, j], sharper)
         error = float(np.max(np.abs(found["last"].values[i, j] - end) / field.scale))
         label, stated = str(found["label"].values[i, j]), float(found["error"][i, j])
         return Lane(of, float(found["rpm"][i]), label, stated, error, noise, peak)
 
     lanes = [beside(i, j) for i, j in np.ndindex(found["label"].shape)]
     # Two integrators may agree by chance: what seems to be off is judged by a better reference.
-    return [beside(*divmod(n, starts.shape[1]), SHARPER) if lane.off else lane for n, lane in enumerate(lanes)]
+    return [beside(*divmod(n, initial_states.shape[1]), SHARPER) if lane.off else lane for n, lane in enumerate(lanes)]
 
 
 def of_model(subject: Subject, count: int) -> Iterator[list[Lane]]:
-    """Lanes from starts, then those that have settled."""
+    """Lanes from initial states, then those that have settled."""
     model, speeds = subject.model, subject.speeds(count)
     first = states(model, speeds, subject.seed)
     yield compare(f"{subject.kind} {subject.name}, start", model, speeds, first)
-    settled = jc.sweep(model, speeds, starts=first, discard=0, revolutions=SETTLING, exponents=0, blocks=1)
+    settled = jc.sweep(model, speeds, initial_states=first, discard=0, revolutions=SETTLING, exponents=0, blocks=1)
     lost = failed(settled)
     later = np.where(lost[..., None], first, settled["last"].values)
     lanes = compare(f"{subject.kind} {subject.name}, settled", model, speeds, later)
     inside = [bool(model.excursion(tuple(y)) <= 1) for y in later.reshape(len(lanes), -1)]  # others may not start
-    yield [lane for lane, gone, starts in zip(lanes, lost.ravel(), inside, strict=True) if starts and not gone]
+    yield [
+        lane
+        for lane, gone, initial_states in zip(lanes, lost.ravel(), inside, strict=True)
+        if initial_states and not gone
+    ]
 
 
 COLUMNS = ("lanes", "known", "failed", "refused", "inacc.", "sure", "OFF", "stated", "largest", "error", "largest")
@@ -151,7 +157,7 @@ def cover(lanes: Sequence[Lane]) -> float:
 
 
 def report(found: Sequence[Subject], quick: bool) -> list[str]:
-    """errors of single revolutions, from starts and from settled states, beside the reference"""
+    """errors of single revolutions, from initial states and from settled states, beside the reference"""
     wrong, every = [], []
     for kind, group in by_kind(found).items():
         print(f"\nOne revolution, {kind}\n{HEAD}", flush=True)

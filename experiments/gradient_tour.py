@@ -64,7 +64,7 @@ for n in (10, 40, 80)[: small(3, 2)]:
 
     def mean_square(gap, n=n):
         strobe = jc.strobe_map(jc.replace(model, guidance_gap=gap), chaotic)
-        start = tuple(jnp.asarray(c, dtype=float) for c in model.starts(chaotic)[0])
+        start = tuple(jnp.asarray(c, dtype=float) for c in model.initial_states(chaotic)[0])
         advance = lambda y, _: (strobe(y).y, y[0] ** 2)
         return jnp.mean(jax.lax.scan(advance, start, None, n)[1])
 

@@ -10,8 +10,8 @@ with quasi-random designs and goes on with an evolution strategy (CMA-ES, of the
 Every design goes to a ledger, a CSV file, from which another run goes on: it skips stages that were done, and begins
 others at the best design that the ledger holds. `--read clearance_reading=radial` searches by another reading of the
 paper, with `cubic_ratio` in place of the cubic stiffness for `support.cubic=dimensionless`. `--check` shows what the
-ledger's best set, or that of `--begin FILE.json`, does at 100 rpm from three starts; with four times the steps by
-`--steps 4`, to another horizon by `--horizon 6000`. `--quick` takes few designs and speeds.
+ledger's best set, or that of `--begin FILE.json`, does at 100 rpm from three initial states; with four times the steps
+by `--steps 4`, to another horizon by `--horizon 6000`. `--quick` takes few designs and speeds.
 """
 
 import argparse
@@ -115,7 +115,7 @@ class Stage:
     horizon: int
     """Revolutions that chaos must last; 0 counts what is seen."""
     speeds: int
-    starts: int
+    initial_states: int
     designs: int
     """Quasi-random ones, a power of 2."""
     generations: int
@@ -175,7 +175,9 @@ class Search:
     def __init__(self, stage: Stage, models: dict[str, jc.CageModel], ledger: Ledger, until: float):
         self.stage, self.models, self.ledger, self.until = stage, models, ledger, until
         self.speeds = np.geomspace(4000, 27500, stage.speeds) * np.pi / 30
-        self.starts = [tuple(float(c) for c in y) for y in jc.case("1a").starts(1000.0)[: stage.starts]]
+        self.initial_states = [
+            tuple(float(c) for c in y) for y in jc.case("1a").initial_states(1000.0)[: stage.initial_states]
+        ]
         self.began, self.tried, self.best = time.perf_counter(), 0, np.inf
 
     def run(self, begin: dict[str, float], seed: int) -> None:
@@ -201,7 +203,7 @@ class Search:
         swept = jc.sweep(
             [with_values(model, unknowns, chosen) for chosen in values for model in self.models.values()],
             self.speeds,
-            starts=self.starts,
+            initial_states=self.initial_states,
             discard=100,
             revolutions=100,
             confirm=False,
@@ -249,7 +251,7 @@ class Search:
 
 
 def check(models: dict[str, jc.CageModel], ledger: Ledger, values: dict[str, float], steps: int, horizon: int) -> None:
-    """Edges of lasting chaos and its wide zones with these values, at 100 rpm, from three starts."""
+    """Edges of lasting chaos and its wide zones with these values, at 100 rpm, from three initial states."""
     method = jc.native().finer(steps.bit_length() - 1) if steps > 1 else None
     errors = []
     for name, case in models.items():

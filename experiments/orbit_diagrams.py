@@ -10,8 +10,8 @@
 # %% [markdown]
 # # Orbit diagrams and zones
 # Two of the paper's cages differ only in their guidance gap: 0.45 mm (1a) and 0.60 mm (1b). Between 6000 and 14000
-# rpm every speed is run from three starts; the strobe points, taken once in a revolution, fill an area where the motion
-# is chaotic: red where that lasts, amber where it dies out. `jaxcage sweep 1a` does the whole range.
+# rpm every speed is run from three initial states; the strobe points, taken once in a revolution, fill an area where
+# the motion is chaotic: red where that lasts, amber where it dies out. `jaxcage sweep 1a` does the whole range.
 
 # %%
 from _size import save, small

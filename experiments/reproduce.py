@@ -120,7 +120,7 @@ def conclusions_on_zones(runs: Runs) -> Iterator[Conclusion]:
     share, what, reach = {}, {}, {}
     for case, found in runs.sweeps.items():
         rpm = found["rpm"].values
-        at = found.isel(speed=int(np.argmin(abs(rpm - SECTION_RPM))), start=0)
+        at = found.isel(speed=int(np.argmin(abs(rpm - SECTION_RPM))), initial_state=0)
         inside = (rpm >= edges[case]["zone 1 onset"]) & (rpm <= edges[case]["zone 1 exit"])
         share[case] = float(np.mean(chaotic_share(found)[inside] > 0)) if np.any(inside) else np.nan
         what[case], reach[case] = str(at["label"].values), float(np.ptp(at["strobe"].values[:, 1]))
@@ -161,7 +161,9 @@ def conclusions_on_forces(runs: Runs) -> Iterator[Conclusion]:
         (ratio > 1.5, bool(without < 0.9 * with_)),
     )
     balance = [jc.replace(model, eccentricity=e) for e in (0.0, 23e-6, 57e-6)]
-    peaks = jc.sweep(balance, jc.rpm(2500, 6500, 17), starts=1, discard=0, revolutions=50, **brief)["peak"].values
+    peaks = jc.sweep(balance, jc.rpm(2500, 6500, 17), initial_states=1, discard=0, revolutions=50, **brief)[
+        "peak"
+    ].values
     best, middle, worst = peaks.reshape(3, -1).mean(axis=1)
     edges = {case: runs.edges(case) for case in ("2a", "2b")}
     steady = {case: found["zone 2 onset"] - found["zone 1 exit"] for case, found in edges.items()}

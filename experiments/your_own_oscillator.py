@@ -47,8 +47,8 @@ method = jc.method("rodas4", steps=64)
 
 # %%
 forces = np.linspace(0.20, 0.50, small(400, 48))
-one = dict(starts=[(0.4, 0.3)], discard=small(300, 50), revolutions=small(200, 40), blocks=10, method=method)
-swept = jc.sweep([make(f) for f in forces], np.array([1.2]), **one).isel(speed=0, start=0)
+one = dict(initial_states=[(0.4, 0.3)], discard=small(300, 50), revolutions=small(200, 40), blocks=10, method=method)
+swept = jc.sweep([make(f) for f in forces], np.array([1.2]), **one).isel(speed=0, initial_state=0)
 exponent = swept["exponents"].values[:, 0]
 print(f"{np.mean(exponent > 0.02):.0%} of the forces are chaotic; largest exponent {exponent.max():.3f} per revolution")
 

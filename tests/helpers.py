@@ -174,13 +174,13 @@ def is_png(path: str) -> bool:
 def made_sweep(
     rpm: Any, strobe: np.ndarray, growth: np.ndarray, outcome: Any = None, scale: Any = None, **attrs: Any
 ) -> xr.Dataset:
-    """A sweep made by hand: strobe states (speeds, starts, revolutions, components) and growth in blocks."""
+    """A sweep made by hand: strobe states (speeds, initial states, revolutions, components) and growth in blocks."""
     lanes, dim = strobe.shape[:2], strobe.shape[-1]
     outcome = np.zeros(lanes, dtype=np.int32) if outcome is None else outcome
     scale = np.broadcast_to(np.ones(dim) if scale is None else np.asarray(scale)[:, None, :], (*lanes, dim))
     exponents, error = growth.mean(axis=2), scatter(growth, axis=2)
     label = label_lanes(outcome, strobe, scale, exponents[..., 0], error[..., 0])
-    at, lost = ("speed", "start"), outcome != 0
+    at, lost = ("speed", "initial_state"), outcome != 0
     speed, keep = np.asarray(rpm) * np.pi / 30, strobe.shape[2]
     return xr.Dataset(
         {
@@ -212,12 +212,13 @@ def followed(sweep: xr.Dataset, escape: np.ndarray, horizon: int) -> xr.Dataset:
     """The sweep with times after which its lanes are calm, as if they had been followed to a horizon."""
     label = sweep["label"].values.copy()
     label[(label == "chaotic") & np.isfinite(escape)] = "transient"
-    later = {"escape": (("speed", "start"), escape), "label": (("speed", "start"), label)}
+    later = {"escape": (("speed", "initial_state"), escape), "label": (("speed", "initial_state"), label)}
     return sweep.assign(later).assign_attrs(horizon=horizon)
 
 
 def cage_sweep() -> xr.Dataset:
-    """Five speeds, three starts: the second speed chaotic, the others periodic, the last lane of the fourth failed."""
+    """Five speeds, three initial states: the second speed chaotic, the others periodic, the last lane of the fourth
+    failed."""
     rng = np.random.default_rng(0)
     strobe = np.repeat(rng.normal(size=(5, 3, 1, 4)), 16, axis=2) * 1e-4
     strobe[1] += rng.normal(size=(3, 16, 4)) * 1e-4

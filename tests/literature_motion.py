@@ -62,15 +62,18 @@ LAWS = (
 """In the order of the table: for the package, and in NumPy."""
 
 
-def largest_exponent(of: Oscillator, starts: int, discard: int, periods: int, steps: int) -> tuple[float, float]:
+def largest_exponent(
+    of: Oscillator, initial_states: int, discard: int, periods: int, steps: int
+) -> tuple[float, float]:
     """Largest exponent per unit of time of the chaotic motion, by Runge-Kutta steps, and its standard error.
 
-    From starts in the square of side 2; those that end on a periodic orbit, with a negative exponent, are left out.
+    From initial states in the square of side 2; those that end on a periodic orbit, with a negative exponent, are left
+    out.
     """
     f, slope, damping, frequency = of
     span = 2 * math.pi / frequency
-    h, growth, y = span / steps, np.zeros(starts), np.zeros((4, starts))
-    y[:2], y[2] = np.random.default_rng(7).uniform(-1, 1, (2, starts)), 1.0
+    h, growth, y = span / steps, np.zeros(initial_states), np.zeros((4, initial_states))
+    y[:2], y[2] = np.random.default_rng(7).uniform(-1, 1, (2, initial_states)), 1.0
     rates = lambda t, y: np.stack([y[1], f(t, y[0], y[1]), y[3], slope(y[0]) * y[2] - damping * y[3]])
     for period in range(discard + periods):
         for t in h * np.arange(steps):
@@ -86,12 +89,19 @@ def largest_exponent(of: Oscillator, starts: int, discard: int, periods: int, st
 
 
 def _exponents(
-    system: Any, speed: float, centre: tuple[float, ...], starts: int, count: int, steps: int, discard: int, length: int
+    system: Any,
+    speed: float,
+    centre: tuple[float, ...],
+    initial_states: int,
+    count: int,
+    steps: int,
+    discard: int,
+    length: int,
 ) -> xr.Dataset:
-    around = np.asarray(centre) + np.random.default_rng(0).uniform(-1, 1, (starts, len(centre)))
+    around = np.asarray(centre) + np.random.default_rng(0).uniform(-1, 1, (initial_states, len(centre)))
     how: Any = dict(exponents=count, blocks=10, keep=1, method=jc.method("rodas4", steps=steps))
     begin = [tuple(map(float, s)) for s in around]
-    return jc.sweep(system, np.array([speed]), starts=begin, discard=discard, revolutions=length, **how)
+    return jc.sweep(system, np.array([speed]), initial_states=begin, discard=discard, revolutions=length, **how)
 
 
 def driven_exponents() -> Iterator[Row]:

@@ -43,7 +43,7 @@ def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = Tru
 
 
 def swept(first: float = 2500.0, last: float = 27500.0, count: int = 251) -> xr.Dataset:
-    """Three starts: chaotic from 9050 to 12050 and from 20050 rpm on, calm elsewhere."""
+    """Three initial states: chaotic from 9050 to 12050 and from 20050 rpm on, calm elsewhere."""
     rpm = np.linspace(first, last, count)
     chaotic = ((rpm > 9050) & (rpm < 12050)) | (rpm > 20050)
     wild = np.random.default_rng(1).uniform(-2e-4, 2e-4, (count, 3, 8, 4))

@@ -32,7 +32,7 @@ unwrap = inspect.unwrap
         (lambda: jc.sweep(DUFFING, SPEEDS[::-1]), "ascending"),
         (lambda: jc.sweep(DUFFING, ["a", "b"]), "`speeds` must be a number or an array of numbers"),
         (lambda: jc.sweep(DUFFING, np.array(["2020"], dtype="datetime64[Y]")), "of real numbers"),
-        (lambda: jc.sweep(DUFFING, SPEEDS, starts=[(1.0,)]), "states of 2 numbers"),
+        (lambda: jc.sweep(DUFFING, SPEEDS, initial_states=[(1.0,)]), "states of 2 numbers"),
         (
             lambda: jc.sweep("1a", SPEEDS),
             "`model` must be of kind AbstractForcedSystem or a row of things, but '1a'",

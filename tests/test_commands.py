@@ -39,8 +39,8 @@ def test_poincare(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     found = document(capsys, "poincare", "1a", "--speed", "15000", *LENGTH, *RK4, "--out", str(tmp_path))
     columns = read_columns(found["data"])
     assert columns["revolution"].tolist() == 3 * list(range(21, 41))
-    for start in found["starts"]:
-        rows = columns["start"] == start["start"]
+    for start in found["initial_states"]:
+        rows = columns["initial_state"] == start["initial_state"]
         assert columns["y_C [m]"][rows] == pytest.approx(np.array(start["y_C"]), rel=1e-10)
     assert is_png(found["figure"])
 
@@ -185,17 +185,26 @@ def test_map_of_labels(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     found = document(capsys, "map", "1a", *asked, "--first", "3000", "--last", "9000", "--out", str(tmp_path))
     assert found["points"] == [9, 7] and sum(found["labels"].values()) == 63 and is_png(found["figure"])
     data = xr.open_zarr(found["data"], consolidated=False, chunks=None)
-    assert data["label"].dims == ("speed", "guidance_gap", "start") and int(np.min(data["label"])) >= 0
+    assert data["label"].dims == ("speed", "guidance_gap", "initial_state") and int(np.min(data["label"])) >= 0
     np.testing.assert_allclose(data["speed"], jc.rpm(3000, 9000, 9), rtol=1e-14)
 
 
 @pytest.mark.wide
 def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    asked = ["study", "1a", "--vary", "speed=9000:12000rpm:6", "--vary", "guidance_gap=0.4mm:0.5mm:2", "--starts", "2"]
+    asked = [
+        "study",
+        "1a",
+        "--vary",
+        "speed=9000:12000rpm:6",
+        "--vary",
+        "guidance_gap=0.4mm:0.5mm:2",
+        "--initial-states",
+        "2",
+    ]
     asked += ["--discard", "10", "--revolutions", "20", "--solver", "rk4", "--steps", "128", "--chunk", "6"]
     asked += ["--out", str(tmp_path)]
     half = document(capsys, *asked, "--shard", "2/2")
-    assert half["axes"] == {"speed": 6, "guidance_gap": 2, "start": 2}
+    assert half["axes"] == {"speed": 6, "guidance_gap": 2, "initial_state": 2}
     assert (half["lanes"], half["stored"], half["stored_before"]) == (24, 12, 0)
     whole = document(capsys, *asked)
     assert (whole["stored"], whole["stored_before"]) == (24, 12)
@@ -203,7 +212,7 @@ def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_pat
     stored = jc.open_study(whole["store"])
     model, speeds = jc.replace(jc.case("1a"), guidance_gap=0.5e-3), jc.rpm(9000, 12000, 6)
     length = dict(discard=10, revolutions=20, blocks=20, keep=16, method=jc.method("rk4", steps=128))
-    swept, mine = raw_sweep(model, speeds, starts=2, **length), stored.isel(guidance_gap=1)
+    swept, mine = raw_sweep(model, speeds, initial_states=2, **length), stored.isel(guidance_gap=1)
     # rounding grows with the exponent: 30 revolutions are short enough
     np.testing.assert_allclose(mine["exponents"], swept["exponents"], rtol=0, atol=1e-3)
     np.testing.assert_allclose(mine["peak"], swept["peak"], rtol=0, atol=1e-3)

@@ -135,7 +135,7 @@ def test_a_failed_lane_counts_as_chaotic():
 def test_fresh_runs_share_nothing_with_those_of_a_search():
     """Other speeds and states, twice as many speeds within the same range, and the states within the clearance."""
     runs = jc.design.Runs(jc.rpm(9000, 10000, 3), discard=0, revolutions=1)
-    first, second = (runs.fresh(number, starts=2) for number in (1, 2))
+    first, second = (runs.fresh(number, initial_states=2) for number in (1, 2))
     for some, other in ((runs, first), (runs, second), (first, second)):
         assert not set(some.speed[:-1]) & set(other.speed[:-1])
     assert second.speed.size == 6 and np.all(np.diff(second.speed) > 0)
@@ -151,7 +151,9 @@ def test_loads_of_the_land_are_those_of_a_time_history():
     compared over few revolutions."""
     models = [jc.replace(jc.case("1b"), guidance_gap=gap, eccentricity=e) for gap, e in ((6e-4, 23e-6), (3e-4, 59e-6))]
     method, fine = (jc.method("rk4", steps=steps) for steps in (1024, 2048))
-    found = jc.design.Runs(jc.rpm(9000, 27500, 2), starts=2, discard=60, revolutions=20, method=method).run(models)
+    found = jc.design.Runs(jc.rpm(9000, 27500, 2), initial_states=2, discard=60, revolutions=20, method=method).run(
+        models
+    )
     got, last, touched = jc.design.land_loads(models, found, method), found["last"].values, 0
     for lane in np.ndindex(*last.shape[:-1]):
         model, speed = models[lane[0]], float(found["speed"][lane[1]])

@@ -175,7 +175,7 @@ def test_width_between_two_edges(found):
         np.testing.assert_allclose(wide.elasticity[name], elasticity, rtol=1e-9)
     assert wide.transversality == min(abs(onset.transversality), abs(leaves.transversality))
     lines = str(wide).splitlines()
-    assert lines[0].startswith("width: unstable at 1243.017 +- ")
+    assert lines[0].startswith("width: unstable at 1243.017 ± ")
     assert wide.error_rpm == onset.error_rpm + leaves.error_rpm < 1e-3
     assert len(lines) == 1 + sum(e != 0.0 for e in wide.elasticity.values())
 

@@ -54,7 +54,7 @@ def test_revolutions_are_those_of_scipy(pair: str):
     """Case 1a off and on its land, three revolutions."""
     model, speed = jc.case("1a"), np.array([4000.0, 13000.0, 24000.0]) * np.pi / 30
     scale = np.array([[float(c) for c in model.scale(jnp.asarray(v))] for v in speed])
-    y = np.array([[float(c) for c in model.starts(jnp.asarray(v))[0]] for v in speed]) / scale
+    y = np.array([[float(c) for c in model.initial_states(jnp.asarray(v))[0]] for v in speed]) / scale
     found = march(model, speed, y, 3, tolerance=1e-9 if pair != "bosh3" else 1e-8, pair=pair)
     assert np.all(found.outcome == FINISHED)
     for i, v in enumerate(speed):
@@ -82,7 +82,7 @@ def test_a_lane_does_not_depend_on_its_neighbours_or_threads():
         together.block_growth[17], alone.block_growth[0]
     )
     scale = np.array([[float(c) for c in model.scale(jnp.asarray(v))] for v in speed])
-    y = np.array([[float(c) for c in model.starts(jnp.asarray(v))[1]] for v in speed]) / scale
+    y = np.array([[float(c) for c in model.initial_states(jnp.asarray(v))[1]] for v in speed]) / scale
     one, two = (march(model, speed, y, 10, threads=threads) for threads in (1, 2))
     assert np.array_equal(one.strobe, two.strobe) and np.array_equal(one.steps, two.steps)
 
@@ -94,8 +94,10 @@ def test_a_lane_that_fails_leaves_its_neighbours_alone():
         return (q[0] ** 3 - 0.1 * v[0],)
 
     system = jc.ForcedOscillator(law, coordinates=1)
-    starts = np.array([[[0.1, 0.0]], [[np.nan, 0.0]], [[3.0, 1.0]], [[-0.1, 0.0]]])
-    found = jc.sweep(system, np.array([1.0, 1.1, 1.2, 1.3]), starts=starts, discard=0, revolutions=1, blocks=1)
+    initial_states = np.array([[[0.1, 0.0]], [[np.nan, 0.0]], [[3.0, 1.0]], [[-0.1, 0.0]]])
+    found = jc.sweep(
+        system, np.array([1.0, 1.1, 1.2, 1.3]), initial_states=initial_states, discard=0, revolutions=1, blocks=1
+    )
     names = found.outcome.values[:, 0]
     assert names[0] == names[3] == "successful" and names[1] == "not_finite" and names[2] != "successful"
     assert np.all(np.isfinite(found.last.values[[0, 3]])) and np.all(np.isnan(found.last.values[[1, 2]]))
@@ -127,9 +129,11 @@ def test_a_law_that_has_no_machine_code_is_run_by_jax_and_says_so(name: str):
 
 def test_histories_are_run_again_until_their_error_is_allowed():
     model, speeds = jc.case("1a"), jc.rpm(9000, 15000, 3)
-    starts = np.array([[float(c) for c in model.starts(jnp.asarray(v))[0]] for v in speeds])
+    initial_states = np.array([[float(c) for c in model.initial_states(jnp.asarray(v))[0]] for v in speeds])
     lanes, rough = Lanes.of([model], speeds), jc.native(1e-3)
-    (_, first), (states, error) = (histories(lanes, starts, 8, 2, method) for method in (rough, jc.native(1e-3, 1e-4)))
+    (_, first), (states, error) = (
+        histories(lanes, initial_states, 8, 2, method) for method in (rough, jc.native(1e-3, 1e-4))
+    )
     assert np.any(first > 1e-4) and np.all(error <= 1e-4) and np.all(np.isfinite(states))
 
 
@@ -148,7 +152,7 @@ def test_damaged_code_is_compiled_again(tmp_path: Any, monkeypatch: pytest.Monke
 def test_an_interrupted_run_stops_within_a_second():
     model, speed = jc.case("1a"), jc.rpm(6000, 26000, 400)
     scale = np.array([[float(c) for c in model.scale(jnp.asarray(v))] for v in speed])
-    y = np.array([[float(c) for c in model.starts(jnp.asarray(v))[0]] for v in speed]) / scale
+    y = np.array([[float(c) for c in model.initial_states(jnp.asarray(v))[0]] for v in speed]) / scale
     begun: list[float] = []
 
     def interrupt(done: int) -> None:

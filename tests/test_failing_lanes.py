@@ -50,10 +50,10 @@ def test_bad_start_fails_alone(bad, place, confirm):
     start, outcome = BAD_STARTS[bad]
     states = [HEALTHY, OTHER, THIRD]
     settings = SETTINGS | (dict(confirm=True, horizon=3000) if confirm else {})
-    healthy = jc.sweep(MODEL, SPEEDS, starts=states, **settings)
+    healthy = jc.sweep(MODEL, SPEEDS, initial_states=states, **settings)
     assert not np.any(failed(healthy))
     states[place] = start
-    mixed = jc.sweep(MODEL, SPEEDS, starts=states, **settings)
+    mixed = jc.sweep(MODEL, SPEEDS, initial_states=states, **settings)
     others = np.s_[:, [i for i in range(3) if i != place]]
     assert_same_bytes(mixed, healthy, others)
     np.testing.assert_array_equal(mixed["label"].values[others], healthy["label"].values[others])
@@ -61,7 +61,7 @@ def test_bad_start_fails_alone(bad, place, confirm):
         assert_failed(mixed, (k, place))
         if outcome is not None:
             assert mixed["outcome"].values[k, place] == outcome
-    # Shares are of the starts that finished.
+    # Shares are of the initial states that finished.
     share = np.sum(healthy["label"].values[others] == "chaotic", axis=1) / 2
     np.testing.assert_array_equal(chaotic_share(mixed), share)
 
@@ -73,9 +73,9 @@ THROWS = np.array([1.0, 3.0, 10.0, 100.0])
 def thrown(model: jc.CageModel, method: jc.solve.AbstractMethod) -> tuple[np.ndarray, xr.Dataset]:
     """A revolution of cages that leave the middle in six directions, and the speed of each."""
     speed, angle = (x.ravel() for x in np.meshgrid(THROWS, np.arange(6) * np.pi / 3, indexing="ij"))
-    starts = [(0.0, 0.0, float(v * np.cos(a)), float(v * np.sin(a))) for v, a in zip(speed, angle, strict=True)]
+    initial_states = [(0.0, 0.0, float(v * np.cos(a)), float(v * np.sin(a))) for v, a in zip(speed, angle, strict=True)]
     length = dict(discard=0, revolutions=1, blocks=1, exponents=0)
-    return speed, raw_sweep(model, jc.rpm(9000.0), starts=starts, method=method, **length)
+    return speed, raw_sweep(model, jc.rpm(9000.0), initial_states=initial_states, method=method, **length)
 
 
 @pytest.mark.wide

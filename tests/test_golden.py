@@ -53,7 +53,9 @@ def _exponents() -> Numbers:
     """Largest exponent per revolution with its standard error: 300 revolutions discarded, 2000 observed."""
     rows = {}
     for case, speed in LANES:
-        found = jc.sweep(jc.case(case), jc.rpm(speed), starts=1, revolutions=2000, blocks=20, horizon=0, confirm=False)
+        found = jc.sweep(
+            jc.case(case), jc.rpm(speed), initial_states=1, revolutions=2000, blocks=20, horizon=0, confirm=False
+        )
         rows[f"{case} {speed:g} rpm"] = [float(found[name][0, 0, 0]) for name in ("exponents", "standard_error")]
     return rows
 
@@ -110,7 +112,7 @@ def _slips() -> Numbers:
     rows = {}
     for load in (4450.0, 300.0):
         model = jc.replace(jc.whole_bearing("nu2310"), load=load)
-        found = jc.sweep(model, jc.rpm(10000), starts=1, discard=60, revolutions=120, exponents=0)
+        found = jc.sweep(model, jc.rpm(10000), initial_states=1, discard=60, revolutions=120, exponents=0)
         error = scatter(found["cage_slip_blocks"].values, axis=-1)
         rows[f"{load:g} N"] = [float(found["cage_slip"][0, 0]), float(error[0, 0])]
     return rows

@@ -66,7 +66,7 @@ def one_revolution(system, speed, chosen, start):
 @pytest.mark.parametrize("kind, steps", [("second order", (64, 128, 256)), ("first order", (256, 512, 1024))])
 def test_observed_order(kind, steps):
     system, speed = SYSTEMS[kind]
-    start = system.starts(speed)[1]
+    start = system.initial_states(speed)[1]
     exact = reference(system, speed, start)
     ends = [one_revolution(system, speed, FixedSteps(Rodas4(), n), start) for n in steps]
     errors = np.array([np.linalg.norm(np.asarray(end) - exact) for end in ends])
@@ -114,7 +114,7 @@ def test_rodas4_integrates_cubic_polynomials_exactly():
 # --- the cage --------------------------------------------------------------------------------
 
 CAGE, SPEED = case("1a", "preliminary"), 15000 * np.pi / 30
-START = CAGE.starts(SPEED)[0]
+START = CAGE.initial_states(SPEED)[0]
 FIELD = second_field(CAGE, SPEED)
 UNIT = FIELD.scale
 

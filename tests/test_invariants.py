@@ -284,7 +284,7 @@ def within(y, model):
 
 
 def smooth_motions(count):
-    """Designs, speeds and starts drawn evenly, of motions that stay where the forces are smooth.
+    """Designs, speeds and initial states drawn evenly, of motions that stay where the forces are smooth.
 
     Hypothesis goes to corners: there a defect is small by chance, or below what double precision resolves.
     """

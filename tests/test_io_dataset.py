@@ -23,7 +23,7 @@ def test_labels_units_and_configuration_are_stored(tmp_path: Path):
     model = jc.replace(jc.case("2b", "preliminary"), guidance_gap=0.5e-3)
     sweep = jc.sweep(model, jc.rpm(8000, 8400, 2), discard=4, revolutions=16, blocks=4, confirm=False, horizon=0)
     stored = xr.open_zarr(save(tmp_path / "sweep.zarr", sweep), consolidated=False, chunks=None)
-    assert stored["strobe"].dims == ("speed", "start", "revolution", "component")
+    assert stored["strobe"].dims == ("speed", "initial_state", "revolution", "component")
     assert stored["component"].values.tolist() == ["x_C", "y_C", "vx_C", "vy_C"]
     assert stored["speed"].attrs["units"] == "rad/s" and stored["rpm"].values == pytest.approx([8000, 8400])
     assert stored["shaft_rpm"].values == pytest.approx(stored["rpm"] / float(model.bearing.cage_speed_ratio))

@@ -28,9 +28,11 @@ def test_this_jax_is_not_a_known_bad_one():
 def test_the_integration_kernel_runs_on_this_jax():
     """The compiled kernel of sweeps, not a path round it: two revolutions of case 1a, beside SciPy's LSODA."""
     model, speed = jc.case("1a"), jc.rpm(15000)
-    found = jc.sweep(model, speed, discard=0, revolutions=2, blocks=1, keep=2, starts=1, confirm=False, horizon=0)
+    found = jc.sweep(
+        model, speed, discard=0, revolutions=2, blocks=1, keep=2, initial_states=1, confirm=False, horizon=0
+    )
     field, scale = model.at_speed(jnp.asarray(speed)), np.array(model.scale(jnp.asarray(speed)))
-    start = np.array(model.starts(jnp.asarray(speed))[0])
+    start = np.array(model.initial_states(jnp.asarray(speed))[0])
     rates = jax.jit(lambda tau, y: jnp.stack(field(tau, tuple(y))))
     expected = solve_ivp(rates, (0, 4 * np.pi), start, "LSODA", rtol=1e-6, atol=1e-6 * scale)
     assert np.max(np.abs(found.strobe[0, 0, -1] - expected.y[:, -1]) / scale) < 1e-3

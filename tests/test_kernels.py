@@ -147,7 +147,7 @@ def attractor():
 
 def one_revolution(speeds, states, chosen):
     return raw_sweep(
-        MODEL, speeds, starts=states, method=chosen, discard=0, revolutions=1, blocks=1, exponents=0, keep=1
+        MODEL, speeds, initial_states=states, method=chosen, discard=0, revolutions=1, blocks=1, exponents=0, keep=1
     )
 
 
@@ -180,7 +180,9 @@ def test_methods_in_machine_code_agree(attractor, name):
 def test_a_stiff_law_is_left_to_the_implicit_method():
     """Prothero and Robinson's problem, whose solution is cos(tau): stable explicit steps would be 1e-6 long."""
     system = jc.ForcedSystem(lambda tau, y, speed: (-1e6 * (y[0] - jnp.cos(tau)) - speed * jnp.sin(tau),), 1)
-    got = raw_sweep(system, np.array([1.0]), starts=[(0.7,)], discard=0, revolutions=2, blocks=1, exponents=0, keep=2)
+    got = raw_sweep(
+        system, np.array([1.0]), initial_states=[(0.7,)], discard=0, revolutions=2, blocks=1, exponents=0, keep=2
+    )
     assert got.outcome.item() == "successful" and abs(got.last.values[0, 0, 0] - 1) < 1e-6
 
 

@@ -24,13 +24,13 @@ from jaxcage.analysis import (
 )
 
 
-def made(label_row: str, step_rpm: float = 100.0, starts: int = 1) -> xr.Dataset:
+def made(label_row: str, step_rpm: float = 100.0, initial_states: int = 1) -> xr.Dataset:
     """A sweep whose lanes carry the labels of the string: 1-8, # chaotic, q quasi-periodic, ? undecided, X failed."""
     n, keep, blocks = len(label_row), 32, 10
     rpm = 5000.0 + step_rpm * np.arange(n)
-    strobe = np.zeros((n, starts, keep, 2))
-    growth = np.zeros((n, starts, blocks, 1))
-    outcome = np.zeros((n, starts), dtype=int)
+    strobe = np.zeros((n, initial_states, keep, 2))
+    growth = np.zeros((n, initial_states, blocks, 1))
+    outcome = np.zeros((n, initial_states), dtype=int)
     wiggle = np.sin(np.sqrt(2) * np.arange(keep))
     noise = 0.01 * np.cos(np.arange(blocks))
     for i, sign in enumerate(label_row):
@@ -127,7 +127,7 @@ class SlowSpirals(eqx.Module):
 def test_slow_spirals_are_not_called_quasi_periodic(revolutions: int):
     """50 lanes, multipliers from 0.95 to 0.999: periodic-1 once they have closed, undecided with a cure before that."""
     system = jc.ForcedOscillator(SlowSpirals(), coordinates=1)
-    settings = dict(discard=revolutions, revolutions=revolutions, confirm=False, horizon=0, starts=1)
+    settings = dict(discard=revolutions, revolutions=revolutions, confirm=False, horizon=0, initial_states=1)
     found = jc.sweep(system, np.linspace(1, 2, 50), **settings, method=jc.method("rk4", steps=64))
     open_ = found["label"].values == "undecided"
     assert np.all(open_ | (found["label"].values == "periodic-1"))
@@ -154,7 +154,7 @@ def test_small_motion_is_labelled_by_its_own_size(scale: float):
     def law(tau, q, v, speed):
         return (0.5 * (1 - (1e5 * q[0]) ** 2) * v[0] - q[0] + 3e-6 * jnp.cos(tau),)
 
-    system = jc.ForcedOscillator(law, coordinates=1, scale=scale, starts=((1e-5, 0.0),))
+    system = jc.ForcedOscillator(law, coordinates=1, scale=scale, initial_states=((1e-5, 0.0),))
     found = jc.sweep(system, np.array([1.9, 2.3]), confirm=False)
     assert np.all(found.label == "quasi-periodic")
     assert np.all(small(found)) == (scale == 1.0) == ("choose a smaller `scale`" in summary(found))
@@ -220,8 +220,8 @@ def test_chaos_that_lasts_and_chaos_that_dies_out_make_zones_of_their_own():
 
 def test_an_edge_is_no_more_certain_than_the_mean_lives_next_to_it():
     """Lanes that leave chaos at the first two speeds of a zone: none; 12 of 20, late; all of them, soon."""
-    sweep = made("111####11", starts=20)
-    sweep = sweep.isel(start=np.zeros(20, dtype=int))
+    sweep = made("111####11", initial_states=20)
+    sweep = sweep.isel(initial_state=np.zeros(20, dtype=int))
     for leaving, at, onset, apart in ((0, 2000.0, 5250, 100), (12, 2000.0, 5250, 150), (20, 320.0, 5450, 100)):
         escape = np.full(sweep["label"].shape, 20.0)
         escape[3:7] = np.inf
@@ -245,15 +245,17 @@ class Ueda(eqx.Module):
 
 @pytest.mark.wide
 def test_map_of_a_system_agrees_with_a_sweep():
-    """Labels are those of sweeps; what a point counts as follows from all of its starts."""
+    """Labels are those of sweeps; what a point counts as follows from all of its initial states."""
     make = lambda force: jc.ForcedOscillator(Ueda(jnp.array(force)), coordinates=1)
     speeds, forces = np.linspace(0.9, 1.4, 9), np.linspace(4.0, 8.0, 8)
     length = dict(discard=60, revolutions=60, blocks=6, method=jc.method("rodas4", steps=32))
-    found = jc.label_map(make(7.5), {"speed": speeds}, {"force": forces}, starts=2, **length)
-    starts = [tuple(float(c) for c in s) for s in make(7.5).starts(1.0)[:2]]
+    found = jc.label_map(make(7.5), {"speed": speeds}, {"force": forces}, initial_states=2, **length)
+    initial_states = [tuple(float(c) for c in s) for s in make(7.5).initial_states(1.0)[:2]]
     same, near = 0, 0
     for j in (0, 7):
-        swept = jc.sweep(make(forces[j]), speeds, starts=starts, keep=16, confirm=False, horizon=0, **length)
+        swept = jc.sweep(
+            make(forces[j]), speeds, initial_states=initial_states, keep=16, confirm=False, horizon=0, **length
+        )
         mine, theirs = found["label"].values[:, j], swept["label"].values
         periodic = np.char.startswith(theirs, "periodic")
         assert np.array_equal(mine[periodic], theirs[periodic])
@@ -261,4 +263,4 @@ def test_map_of_a_system_agrees_with_a_sweep():
         assert np.mean(too_short(found)[:, j][agree] == too_short(swept)[agree]) > 0.9
         same, near = same + np.sum(agree), near + mine.size
     assert same >= 0.9 * near  # long chaotic lanes differ by rounding, and a few of their labels with them
-    assert found["label"].dims == ("speed", "force", "start") and np.any(found["label"] == "chaotic")
+    assert found["label"].dims == ("speed", "force", "initial_state") and np.any(found["label"] == "chaotic")

@@ -57,7 +57,9 @@ def test_shooting_finds_the_doublings_of_the_table(periods: int):
 def test_ensembles_find_the_exponents_of_the_table(index: int):
     """A smaller one than the table's."""
     number = list(EXPONENTS.values())[index]
-    found, error = motion.largest_exponent(motion.LAWS[index][1], starts=1024, discard=50, periods=150, steps=64)
+    found, error = motion.largest_exponent(
+        motion.LAWS[index][1], initial_states=1024, discard=50, periods=150, steps=64
+    )
     assert error < 6e-4 and abs(found - number.value) < number.tolerance + 3 * error
 
 

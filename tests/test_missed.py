@@ -88,13 +88,14 @@ def test_branches_that_cross_and_branches_that_nearly_do(name):
 
 @pytest.mark.wide
 def test_search_meets_what_only_the_opposite_start_leads_to():
-    """Two wells, and starts in one of them: the orbits of both are found, and the counts are those of the starts."""
+    """Two wells, and starts in one of them: the orbits of both are found, and the counts are those of the initial
+    states."""
 
     def well(tau, q, v, speed):
         (x,), (u,) = q, v
         return (-0.5 * u + x - x**3 + 0.05 * jnp.cos(tau),)
 
-    system = jc.ForcedOscillator(well, coordinates=1, starts=((1.1, 0.1),))
+    system = jc.ForcedOscillator(well, coordinates=1, initial_states=((1.1, 0.1),))
     found = jc.synchronous_orbits(system, 0.5, 0.6, count=3, discard=20, method=jc.method("rk4", steps=128))
     assert {float(np.sign(b.state[0, 0])) for b in found.branches} == {-1.0, 1.0} and found.missed == 0
     assert sorted(s.met for s in found.stretches) == [0, 3]

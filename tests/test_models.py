@@ -32,7 +32,7 @@ def revolve(model: jc.CageModel, speed, y):
 
 
 def state(model: jc.CageModel, speed: float):
-    y = model.starts(jnp.asarray(speed))[2]
+    y = model.initial_states(jnp.asarray(speed))[2]
     return jnp.stack([jnp.asarray(c) for c in y])
 
 
@@ -155,12 +155,15 @@ SPRING = lambda tau, q, v, speed: (-q[0] - 0.1 * v[0] + jnp.cos(tau),)
         (dict(scale=[1.0, -2.0]), r"`scale` must be .*, but \[1.0, -2.0\] was given"),
         (dict(scale=np.ones((2, 2))), r"`scale` must be .*, but an array of shape \(2, 2\)"),
         (
-            dict(starts=((0.1, 0.2, 0.3),)),
-            r"`starts` must be states of 2 finite numbers each, but \(0.1, 0.2, 0.3\) is",
+            dict(initial_states=((0.1, 0.2, 0.3),)),
+            r"`initial_states` must be states of 2 finite numbers each, but \(0.1, 0.2, 0.3\) is",
         ),
-        (dict(starts=((0.1, 0.2), (0.1, np.nan))), r"`starts` must be .*, but \(0.1, nan\) is among them"),
-        (dict(starts=(0.1, 0.2)), "`starts` must be "),
-        (dict(starts=3.0), "`starts` must be "),
+        (
+            dict(initial_states=((0.1, 0.2), (0.1, np.nan))),
+            r"`initial_states` must be .*, but \(0.1, nan\) is among them",
+        ),
+        (dict(initial_states=(0.1, 0.2)), "`initial_states` must be "),
+        (dict(initial_states=3.0), "`initial_states` must be "),
         (dict(harmonics=0), "`harmonics` must be a whole number from 1 to 4096, but 0 was given"),
         (dict(harmonics=5000), "`harmonics` must be .*, but 5000 was given"),
         (dict(harmonics=2.5), "`harmonics` must be a whole number, but 2.5"),

@@ -32,7 +32,7 @@ def run_blocks(page: str) -> tuple[dict, str]:
 @pytest.mark.wide
 def test_python_blocks_of_the_readme():
     space, text = run_blocks(README)
-    assert "9 speeds, 3 starts" in text and "at a resolution of 500 rpm" in text
+    assert "9 speeds, 3 initial states" in text and "at a resolution of 500 rpm" in text
     assert float(space["force"]) == pytest.approx(DUFFING_DOUBLINGS[1][1].value, abs=1e-7)
     assert float(space["slope"].acceleration.cubic / space["force"]) == pytest.approx(-0.5, abs=1e-9)
 

@@ -53,11 +53,11 @@ def test_orbit_diagram_shows_every_strobe_point_of_every_start():
 
 
 def test_exponent_strip():
-    """The largest exponent with a band of two standard errors; a speed at which all starts failed is a gap."""
+    """The largest exponent with a band of two standard errors; a speed at which all initial states failed is a gap."""
     sweep = cage_sweep()
     sweep["label"].values[4], sweep["exponents"].values[4], sweep["standard_error"].values[4] = "failed", np.nan, np.nan
     ax, every = exponent_strip(sweep), sweep["exponents"].values[..., 0]
-    largest = points(ax, "largest of the starts")
+    largest = points(ax, "largest of the initial states")
     assert largest[:, 0] == pytest.approx([8000, 8100, 8200, 8300])
     np.testing.assert_allclose(largest[:, 1], np.nanmax(every[:4], axis=1))
     (band,) = ax.collections
@@ -179,7 +179,7 @@ def two_curves() -> list[Curve]:
 def test_curves_and_exponents_share_their_axes():
     """Curves in the parameter's unit; exponents beneath them are white at zero, red above, blue below."""
     rpm, gap = np.linspace(9000, 11000, 5), np.array([4e-4, 5e-4, 6e-4])
-    largest, axes = np.outer(np.linspace(-1, 1, 5), [0.1, 0.2, 0.3]), ("speed", "guidance_gap", "start")
+    largest, axes = np.outer(np.linspace(-1, 1, 5), [0.1, 0.2, 0.3]), ("speed", "guidance_gap", "initial_state")
     label = np.full((5, 3, 1), "undecided")
     label[0, 0], largest[0, 0] = "failed", np.nan
     values = {"label": (axes, label), "exponents": ((*axes, "exponent"), largest[..., None, None])}

@@ -150,7 +150,7 @@ def test_one_revolution_of_each_film(film):
     image = eqx.filter_jit(lambda speed, y: jc.strobe_map(model, speed, jc.method("rk4", steps=8192))(y))
     for rpm, tolerance in ((6000, 1e-9), (24000, 1e-6)):
         speed = jc.rpm(rpm)
-        field, start = reference.field(model, speed), [float(c) for c in model.starts(speed)[0]]
+        field, start = reference.field(model, speed), [float(c) for c in model.initial_states(speed)[0]]
         found, expected = image(jnp.asarray(speed), as_state(start)), reference.confirmed(field, start)
         apart = (np.array([float(c) for c in found.y]) - expected.strobe[-1]) / field.scale
         assert expected.spread < 1e-8
@@ -192,6 +192,6 @@ def test_growth_in_chaos(rpm):
     settled = jc.sweep(model, speed, discard=150, revolutions=100, horizon=0)
     at = settled.last.values[0, list(settled.label.values[0]).index("chaotic")]
     brief = dict(discard=0, revolutions=6, blocks=6, confirm=False, horizon=0)
-    ours = jc.sweep(model, speed, starts=at[None, None], method=jc.method("rk4", steps=8192), **brief)
+    ours = jc.sweep(model, speed, initial_states=at[None, None], method=jc.method("rk4", steps=8192), **brief)
     theirs = reference.growth(reference.field(model, speed), at, 6, direction=start_tangents(4, 1)[0])
     np.testing.assert_allclose(ours.block_growth.values[0, 0, :, 0], theirs, rtol=0, atol=1e-4)

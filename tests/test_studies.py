@@ -37,7 +37,7 @@ class Duffing(eqx.Module):
 OSCILLATOR = jc.ForcedOscillator(Duffing(jnp.array(0.1), jnp.array(1.0)), coordinates=1)
 SPEEDS, CUBICS = np.linspace(1.1, 1.9, 9), np.array([0.5, 1.0, 1.5, -4.0])
 LENGTH: dict[str, Any] = {"discard": 40, "revolutions": 40, "blocks": 4, "method": jc.method("rodas4", steps=32)}
-OPTIONS: dict[str, Any] = {**LENGTH, "starts": 2, "lanes": 12, "name": "duffing", "version": "1"}
+OPTIONS: dict[str, Any] = {**LENGTH, "initial_states": 2, "lanes": 12, "name": "duffing", "version": "1"}
 VARY: dict[str, Any] = {"cubic": CUBICS, "speed": SPEEDS, "damping": Between(0.08, 0.12, normal=True)}
 
 
@@ -52,7 +52,7 @@ def contents(store: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The store of an unbroken run: 2 samples x 4 cubics x 9 speeds x 2 starts in 16 chunks."""
+    """The store of an unbroken run: 2 samples x 4 cubics x 9 speeds x 2 initial states in 16 chunks."""
     jc.keep_compiled_programs(tmp_path_factory.mktemp("programs"))
     store = tmp_path_factory.mktemp("whole") / "study.zarr"
     duffing_study(store)
@@ -64,7 +64,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_lanes_are_those_of_a_sweep(whole: Path, places: tuple[tuple[int, int], ...]):
     """Labels and exponents of lanes, against sweeps of one system at a time, whose programs hold it as constants."""
     found = jc.open_study(whole)
-    assert found["label"].dims == ("sample", "cubic", "speed", "start")
+    assert found["label"].dims == ("sample", "cubic", "speed", "initial_state")
     damping = found["damping"].values
     for i, j in places:
         system = eqx.tree_at(
@@ -72,8 +72,8 @@ def test_lanes_are_those_of_a_sweep(whole: Path, places: tuple[tuple[int, int], 
             OSCILLATOR,
             (jnp.array(damping[i]), jnp.array(CUBICS[j])),
         )
-        starts = [tuple(float(c) for c in start) for start in system.starts(1.0)[:2]]
-        swept = jc.sweep(system, SPEEDS, starts=starts, keep=16, confirm=False, horizon=0, **LENGTH)
+        initial_states = [tuple(float(c) for c in start) for start in system.initial_states(1.0)[:2]]
+        swept = jc.sweep(system, SPEEDS, initial_states=initial_states, keep=16, confirm=False, horizon=0, **LENGTH)
         mine = found.isel(sample=i, cubic=j)
         assert np.array_equal(mine["label"], swept["label"])
         for name in ("exponents", "standard_error"):

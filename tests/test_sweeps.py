@@ -31,9 +31,9 @@ def test_lanes_do_not_depend_on_their_neighbours_or_chunks():
     """300 lanes in three chunks, and the same speeds in pieces: bit for bit the same."""
     speeds = np.linspace(1.0, 2.0, 150)
     options = {"discard": 5, "revolutions": 20, "blocks": 4, "keep": 8, "method": FAST}
-    starts = [(0.1, 0.0), (1.0, 0.5)]
-    whole = raw_sweep(HARDENING, speeds, starts=starts, **options)
-    pieces = [raw_sweep(HARDENING, speeds[i::2], starts=starts, **options) for i in (0, 1)]
+    initial_states = [(0.1, 0.0), (1.0, 0.5)]
+    whole = raw_sweep(HARDENING, speeds, initial_states=initial_states, **options)
+    pieces = [raw_sweep(HARDENING, speeds[i::2], initial_states=initial_states, **options) for i in (0, 1)]
     for i, piece in enumerate(pieces):
         assert np.array_equal(whole["strobe"][i::2], piece["strobe"])
         assert np.array_equal(whole["block_growth"][i::2], piece["block_growth"])
@@ -56,7 +56,7 @@ def test_chaos_is_followed_to_the_horizon(followed):
     late = raw_sweep(
         UEDA,
         followed["speed"].values,
-        starts=followed["last"].values,
+        initial_states=followed["last"].values,
         discard=0,
         revolutions=60,
         blocks=6,
@@ -96,7 +96,7 @@ RATE = 0.01
 TURN = 2.0 * np.pi * (np.sqrt(5.0) - 1.0)
 """Angle by which the second oscillator goes on in a revolution, incommensurate with it."""
 LENGTH: dict[str, Any] = dict(
-    starts=None, discard=30, revolutions=60, blocks=6, method=jc.method("rk4", steps=128), confirm=False
+    initial_states=None, discard=30, revolutions=60, blocks=6, method=jc.method("rk4", steps=128), confirm=False
 )
 
 
@@ -112,9 +112,11 @@ def ueda_until(tau, y, speed):
 
 def lanes_that_end_after(revolutions: np.ndarray, turning: bool) -> xr.Dataset:
     """A lane for each, in which chaos ends after so many revolutions; its end never closes if the other one turns."""
-    starts = [(0.1 + 0.01 * i, 0.2, float(np.exp(RATE * n)), float(turning), 0.0) for i, n in enumerate(revolutions)]
+    initial_states = [
+        (0.1 + 0.01 * i, 0.2, float(np.exp(RATE * n)), float(turning), 0.0) for i, n in enumerate(revolutions)
+    ]
     system = jc.ForcedSystem(ueda_until, dimension=5)
-    return jc.sweep(system, np.array([1.0]), **LENGTH | dict(starts=starts), horizon=1200)
+    return jc.sweep(system, np.array([1.0]), **LENGTH | dict(initial_states=initial_states), horizon=1200)
 
 
 @pytest.mark.parametrize("turning", [False, True], ids=["periodic", "quasi-periodic"])

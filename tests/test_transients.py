@@ -167,12 +167,14 @@ def ueda(force):
     return jc.ForcedOscillator(Ueda(jnp.array(force)), coordinates=1)
 
 
-def lives(forces, starts, steps, revolutions) -> list[Survival]:
+def lives(forces, initial_states, steps, revolutions) -> list[Survival]:
     """A `Survival` for each force; t0 is 50 revolutions."""
     method = jc.method("rk4", steps=steps)
     length = dict(discard=0, revolutions=revolutions, blocks=revolutions // BLOCK)
     found = []
-    swept = raw_sweep([ueda(f) for f in forces], 1.0, starts=starts, method=method, **length).isel(speed=0)
+    swept = raw_sweep([ueda(f) for f in forces], 1.0, initial_states=initial_states, method=method, **length).isel(
+        speed=0
+    )
     for i in range(len(forces)):
         s = swept.isel(design=i)
         growth = s["block_growth"].values[..., 0]
@@ -185,9 +187,9 @@ def lives(forces, starts, steps, revolutions) -> list[Survival]:
 @pytest.fixture(scope="module")
 def chaotic_starts():
     """States on the chaotic attractor before the crisis; elsewhere lanes end on a periodic orbit beside it."""
-    starts = [tuple(map(float, s)) for s in np.random.default_rng(1).uniform((-2, -4), (4, 8), (260, 2))]
+    initial_states = [tuple(map(float, s)) for s in np.random.default_rng(1).uniform((-2, -4), (4, 8), (260, 2))]
     length = dict(discard=60, revolutions=60, blocks=6, method=jc.method("rk4", steps=128))
-    s = raw_sweep(ueda(13.3), 1.0, starts=starts, **length)
+    s = raw_sweep(ueda(13.3), 1.0, initial_states=initial_states, **length)
     # By so few steps the error of a chaotic exponent may be large: such a lane is undecided.
     label = s["label"].values[0]
     share = {name: float(np.mean(label == name)) for name in ("chaotic", "periodic-1", "undecided")}

@@ -97,10 +97,10 @@ def test_errors_of_successful_lanes_are_stated_and_within_the_tolerance(wide):
 def test_a_hopeless_design_leaves_its_neighbours_as_they_are():
     designs = [MODEL, beyond_range(MODEL, stiffness=1e20, onset=0.3), replaced(eccentricity=2e-5)]
     speeds = jc.rpm(9000, 15000, 2)
-    starts = [(0.6 * float(MODEL.clearance), 0.0, 0.0, 0.0)]
-    beside = jc.sweep(designs, speeds, starts=starts, **SHORT)
+    initial_states = [(0.6 * float(MODEL.clearance), 0.0, 0.0, 0.0)]
+    beside = jc.sweep(designs, speeds, initial_states=initial_states, **SHORT)
     assert not np.any(np.isin(beside.label[1], ("chaotic", "undecided", "quasi-periodic")))
-    alone = jc.sweep([designs[0], designs[2], designs[2]], speeds, starts=starts, **SHORT)
+    alone = jc.sweep([designs[0], designs[2], designs[2]], speeds, initial_states=initial_states, **SHORT)
     for name in ("strobe", "block_growth", "outcome", "error", "peak"):
         assert np.array_equal(beside[name][[0, 2]], alone[name][[0, 2]]), name
 

@@ -197,8 +197,8 @@ GRID = np.linspace(LOWER, UPPER, 13)
 
 @pytest.fixture(scope="module")
 def hardening():
-    starts = ((0.1, 0.2), (2.0, 1.0), (-1.5, 2.0))
-    system = hardening_law(starts=starts)
+    initial_states = ((0.1, 0.2), (2.0, 1.0), (-1.5, 2.0))
+    system = hardening_law(initial_states=initial_states)
     return jc.synchronous_orbits(system, LOWER, UPPER, count=GRID.size, discard=100, method=METHOD)
 
 

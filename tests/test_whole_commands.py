@@ -67,9 +67,9 @@ def test_zones_map_and_runup(capsys: pytest.CaptureFixture[str], tmp_path: pathl
     mapped = document(capsys, "map", *RANGE, "--lower", "1 kN", "--points", "2x2", "--revolutions", "2", *out)
     assert mapped["y"] == "load" and mapped["y_range"] == pytest.approx([1000, 1.25 * 4450])
     models = [jc.replace(jc.whole_bearing("nu2310"), load=x) for x in mapped["y_range"]]
-    each = jc.sweep(models, jc.rpm(8000, 10000, 2), starts=1, discard=0, revolutions=2, blocks=2)
-    power = load(mapped["data"])["friction_power_W"].isel(start=0)
-    np.testing.assert_allclose(power, each["friction_power_W"].isel(start=0).T, rtol=0.05)
+    each = jc.sweep(models, jc.rpm(8000, 10000, 2), initial_states=1, discard=0, revolutions=2, blocks=2)
+    power = load(mapped["data"])["friction_power_W"].isel(initial_state=0)
+    np.testing.assert_allclose(power, each["friction_power_W"].isel(initial_state=0).T, rtol=0.05)
     ramped = document(capsys, "runup", *RANGE[:-2], "--windows", "2", "--rate", "20000", *out)
     assert len(ramped["up"]["cage_slip"]) >= 2 and is_png(mapped["figure"]) and is_png(ramped["figure"])
 
@@ -77,11 +77,22 @@ def test_zones_map_and_runup(capsys: pytest.CaptureFixture[str], tmp_path: pathl
 @pytest.mark.wide
 def test_gradient(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     names = ("guidance_gap", "cage_mass+cage_inertia")
-    asked = ["gradient", "nu2310", "--speed", "10000 rpm shaft", "--load", "1 kN", "--designs", "10", "--starts", "1"]
+    asked = [
+        "gradient",
+        "nu2310",
+        "--speed",
+        "10000 rpm shaft",
+        "--load",
+        "1 kN",
+        "--designs",
+        "10",
+        "--initial-states",
+        "1",
+    ]
     asked += ["--by", *names, "--discard", "1", "--revolutions", "2"]
     found = document(capsys, *asked, "--out", str(tmp_path))
     model = jc.replace(jc.whole_bearing("nu2310"), load=1000.0)
-    runs = Runs(SPEED, starts=1, discard=1, revolutions=2, blocks=2, exponents=0, tolerance=1e-4)
+    runs = Runs(SPEED, initial_states=1, discard=1, revolutions=2, blocks=2, exponents=0, tolerance=1e-4)
     expected = mean_gradient(model, runs, directions=names, designs=10)
     rows = {row["name"]: row for row in found["statistics"]}
     power, each = rows["friction_power_W"], expected.statistics["friction_power_W"]
@@ -95,7 +106,7 @@ def test_gradient(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
 def test_design(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     """Power alone by the gap: a wider gap drags less (Petroff), which the search finds and the check confirms."""
     asked = ["design", "nu2310", "--speed", "10000 rpm shaft", "--vary", "guidance_gap=0.4mm:0.6mm", "--batch", "4"]
-    asked += ["--starts", "2", "--discard", "2", "--revolutions", "2", "--steps", "2"]
+    asked += ["--initial-states", "2", "--discard", "2", "--revolutions", "2", "--steps", "2"]
     asked += [x for name in ("wear", "force", "impulse", "slip", "balance") for x in (f"--{name}", "0")]
     found = document(capsys, *asked, "--out", str(tmp_path))
     rows = {row["name"]: row for row in found["before_and_after"]}
@@ -106,10 +117,19 @@ def test_design(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
 
 @pytest.mark.wide
 def test_study(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
-    asked = ["study", "nu2310", "--vary", "speed=9000rpm,5000 rpm cage", "--vary", "load=1kN:2kN:2", "--starts", "1"]
+    asked = [
+        "study",
+        "nu2310",
+        "--vary",
+        "speed=9000rpm,5000 rpm cage",
+        "--vary",
+        "load=1kN:2kN:2",
+        "--initial-states",
+        "1",
+    ]
     asked += ["--discard", "1", "--revolutions", "10", "--out", str(tmp_path)]
     found = document(capsys, *asked)
-    assert found["axes"] == {"speed": 2, "load": 2, "start": 1} and sum(found["labels"].values()) == 4
+    assert found["axes"] == {"speed": 2, "load": 2, "initial_state": 1} and sum(found["labels"].values()) == 4
     stored = jc.open_study(found["store"])
     ratio = float(jc.whole_bearing("nu2310").rolling_cage_speed(1.0))
     np.testing.assert_allclose(stored["speed"], jc.rpm(1.0) * np.array([9000, 5000 / ratio]))

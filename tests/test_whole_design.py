@@ -19,15 +19,15 @@ from jaxcage.design import (
 jc.enable_x64()
 SPEED = float(jc.rpm(10000))
 MODEL = jc.whole_bearing("nu2310")
-RUNS = Runs.of_bearing(SPEED, starts=2, discard=2, revolutions=2)
+RUNS = Runs.of_bearing(SPEED, initial_states=2, discard=2, revolutions=2)
 PRICES = {"power": 3.0, "slip": 1.0, "balance": 2.0}
 
 
 def swept(model: jc.BearingModel):
     """The runs that `RUNS` stands for."""
     length = dict(discard=RUNS.discard, revolutions=RUNS.revolutions, blocks=2, exponents=0)
-    states = drawn_states(model, np.array([SPEED]), RUNS.starts, 0)
-    return jc.sweep(model, SPEED, starts=states, tolerance=RUNS.tolerance, **length)
+    states = drawn_states(model, np.array([SPEED]), RUNS.initial_states, 0)
+    return jc.sweep(model, SPEED, initial_states=states, tolerance=RUNS.tolerance, **length)
 
 
 @pytest.mark.wide

@@ -29,7 +29,7 @@ def calm():
 def test_a_calm_bearing_by_closed_form_and_by_differences():
     """Petroff's drag goes with viscosity, land width, and R^3 over the gap; its cage neither slips much nor rattles."""
     model, start = calm()
-    length = dict(starts=[start], discard=4, revolutions=2)
+    length = dict(initial_states=[start], discard=4, revolutions=2)
     runs = Runs(SPEED, blocks=2, exponents=0, **length)
     found = mean_gradient(model, runs, directions=CALM, designs=16, spread=0.01)
     gap, wide = float(model.guidance_gap), float(model.bearing.rib_diameter)
@@ -51,16 +51,16 @@ def test_a_calm_bearing_by_closed_form_and_by_differences():
 
 @pytest.mark.wide
 def test_a_rattling_bearing_by_differences():
-    """Power and impulse by the gap: scattered designs of two seeds against differences from common starts."""
+    """Power and impulse by the gap: scattered designs of two seeds against differences from common initial states."""
     model = bearing(load=1000.0)
     length = dict(discard=4, revolutions=6)
-    starts = [rolling_start(model, SPEED, k) for k in range(3)]
+    initial_states = [rolling_start(model, SPEED, k) for k in range(3)]
     rng = np.random.default_rng(5)
     shaken = lambda s: s._replace(bodies=s.bodies.at[2:4].add(jnp.asarray(rng.normal(size=2) * 5e-3)))
-    several = [tuple(shaken(start).row) for start in starts * 5]
+    several = [tuple(shaken(start).row) for start in initial_states * 5]
     designs = [jc.replace(model, guidance_gap=float(model.guidance_gap) * (1 + side)) for side in (0.1, -0.1)]
-    ends = jc.sweep(designs, SPEED, starts=several, blocks=1, exponents=0, **length)
-    runs = Runs(SPEED, starts=2, blocks=2, exponents=0, **length)
+    ends = jc.sweep(designs, SPEED, initial_states=several, blocks=1, exponents=0, **length)
+    runs = Runs(SPEED, initial_states=2, blocks=2, exponents=0, **length)
     for seed in (1, 2):
         found = mean_gradient(model, runs, directions=("guidance_gap",), designs=16, spread=0.1, seed=seed)
         for name in ("friction_power_W", "land_impulse_N_s", "pocket_impulse_N_s"):

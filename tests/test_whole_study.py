@@ -20,12 +20,14 @@ def test_every_lane_is_in_its_place(order: tuple[str, ...], tmp_path: pathlib.Pa
     """Speeds that do not ascend, on the slow axis or the fast one, in chunks that cut axes and starts."""
     values = {"speed": np.asarray(jc.rpm(8000, 12000, 2))[::-1], "load": np.array([1000.0, 3000.0])}
     store = tmp_path / "store"
-    found = jc.study(BEARING, {name: values[name] for name in order}, store=store, lanes=3, starts=2, **LENGTH)
-    assert found["cage_slip"].dims == (*order, "start")
+    found = jc.study(BEARING, {name: values[name] for name in order}, store=store, lanes=3, initial_states=2, **LENGTH)
+    assert found["cage_slip"].dims == (*order, "initial_state")
     assert found["speed"].attrs["long_name"] == "shaft speed"
-    swept = jc.sweep([jc.replace(BEARING, load=x) for x in values["load"]], values["speed"][::-1], starts=2, **LENGTH)
+    swept = jc.sweep(
+        [jc.replace(BEARING, load=x) for x in values["load"]], values["speed"][::-1], initial_states=2, **LENGTH
+    )
     errors = {"cage_slip": 1e-4, "friction_power_W": 1.0, "eccentricity_mean": 1e-3}
-    mine = [found[n].transpose("load", "speed", "start").values.ravel() / e for n, e in errors.items()]
+    mine = [found[n].transpose("load", "speed", "initial_state").values.ravel() / e for n, e in errors.items()]
     theirs = [swept[n].values[:, ::-1].ravel() / e for n, e in errors.items()]
     apart = np.abs(np.array(mine)[:, :, None] - np.array(theirs)[:, None]).max(axis=0)
     assert np.all((apart < 1) == np.eye(8, dtype=bool))  # each lane is like its own one only
@@ -36,7 +38,7 @@ def test_every_lane_is_in_its_place(order: tuple[str, ...], tmp_path: pathlib.Pa
     [
         ({"load": [1e3]}, {}, "`vary` must hold the speed"),
         ({"speed": [900.0], "grease": [32.0]}, {}, "grease"),
-        ({"speed": [900.0]}, {"starts": 9}, "`starts` must be at most 3, but 9 was given"),
+        ({"speed": [900.0]}, {"initial_states": 9}, "`initial_states` must be at most 3, but 9 was given"),
     ],
 )
 def test_refusals(vary: dict[str, Any], options: dict[str, Any], said: str, tmp_path: pathlib.Path):

@@ -120,7 +120,7 @@ def test_rollers_have_no_names():
 @pytest.mark.wide
 def test_slow_shafts_run_through():
     """At 1000 rpm a sixteenth of a revolution takes 9 ms, in which neighbouring motions diverge by a factor of 100."""
-    found = jc.sweep(bearing(), jc.rpm(1000.0), starts=1, discard=1, revolutions=1, blocks=1)
+    found = jc.sweep(bearing(), jc.rpm(1000.0), initial_states=1, discard=1, revolutions=1, blocks=1)
     assert found.outcome.item() == "successful" and found.error.item() < 0.05 and found.exponents.item() > 50
 
 
@@ -142,15 +142,19 @@ def test_exponents_of_the_last_revolutions():
 def swept():
     """A lane that fails, since its cage hardly turns, beside one that does not."""
     model = bearing(eccentricity=0.0)
-    starts = [rolling_start(model, SPEED, 1), rolling_start(model, SPEED, turning=0.01)]
-    return model, starts, jc.sweep(model, np.array([SPEED, 1.1 * SPEED]), starts=starts, **SHORT)
+    initial_states = [rolling_start(model, SPEED, 1), rolling_start(model, SPEED, turning=0.01)]
+    return (
+        model,
+        initial_states,
+        jc.sweep(model, np.array([SPEED, 1.1 * SPEED]), initial_states=initial_states, **SHORT),
+    )
 
 
 @pytest.mark.wide
 def test_a_lane_that_fails_spoils_no_other(swept):
-    model, starts, both = swept
+    model, initial_states, both = swept
     assert list(both.outcome.values[0]) == ["successful", "outside"] and both.label.values[0, 1] == "failed"
-    alone = jc.sweep(model, SPEED, starts=starts[:1], **SHORT)
+    alone = jc.sweep(model, SPEED, initial_states=initial_states[:1], **SHORT)
     for name in ("cage_slip", "pocket_force_max_N", "friction_power_W", "whirl_ratio", "exponents"):
         good, bad = both[name].values[0]
         np.testing.assert_array_equal(good, alone[name].values[0, 0])
@@ -159,9 +163,9 @@ def test_a_lane_that_fails_spoils_no_other(swept):
 
 def test_measures_of_a_sweep_are_those_of_a_run(swept):
     """Over a revolution from the same state; two runs drift apart in it, but their means do not."""
-    model, starts, both = swept
-    run = jc.simulate(model, SPEED, revolutions=1, samples=32, start=starts[0])
-    expected, found = jc.measures(model, run), both.isel(speed=0, start=0)
+    model, initial_states, both = swept
+    run = jc.simulate(model, SPEED, revolutions=1, samples=32, start=initial_states[0])
+    expected, found = jc.measures(model, run), both.isel(speed=0, initial_state=0)
     assert found.cage_slip.item() == pytest.approx(expected.value("cage_slip"), abs=2e-4)
     assert found.eccentricity_std.item() == pytest.approx(expected.value("eccentricity_std"), rel=0.1)
     for name in ("eccentricity_mean", "power_film_W", "friction_power_W"):
@@ -175,7 +179,7 @@ def test_what_cannot_be_swept():
     for method in (jc.method("rk4"), jc.native(pair="rodas4")):
         with pytest.raises(ValueError, match="must be `native`"):
             jc.sweep(model, SPEED, method=method)
-    for options in ({"starts": 4}, {"blocks": 3}, {"exponents": 2}, {"discard": -1}):
+    for options in ({"initial_states": 4}, {"blocks": 3}, {"exponents": 2}, {"discard": -1}):
         with pytest.raises(ValueError, match=next(iter(options))):
             jc.sweep(model, SPEED, **options)
     with pytest.raises(ValueError, match="ascending"):
@@ -183,14 +187,14 @@ def test_what_cannot_be_swept():
     few = rolling_start(model, SPEED)
     few = few._replace(rollers=few.rollers[:, :12])
     with pytest.raises(ValueError, match="74 numbers"):
-        jc.sweep(model, SPEED, starts=[few])
+        jc.sweep(model, SPEED, initial_states=[few])
 
 
 @pytest.mark.wide
 def test_designs_in_one_batch_are_those_one_by_one():
     """Two loads over a short window: as each alone, but for rounding that chaos makes large."""
     models = [bearing(load=load) for load in (4450.0, 2000.0)]
-    options = dict(SHORT, starts=[rolling_start(models[0], SPEED, 1)], method=jc.native(1e-6, 1e-2))
+    options = dict(SHORT, initial_states=[rolling_start(models[0], SPEED, 1)], method=jc.native(1e-6, 1e-2))
     both = jc.sweep(models, SPEED, **options)
     for i, model in enumerate(models):
         alone, found = jc.sweep(model, SPEED, **options), both.isel(design=i)

@@ -15,8 +15,8 @@ survived in whole blocks and n escapes the most likely mean life is
 which is E/n for short blocks, and E/n + b/2 to first order: what those that escaped survived of their last block. It is
 the inverse 1/kappa of the escape rate of continuous time; lanes that survive a block with probability q have
 kappa = -log(q) / b. For an iterated map b = 1. A delay between an escape and the sign of it does not matter, as long as
-it is the same, or as random, early and late. Lanes must be independent: starts spread over states, not over rounding
-errors.
+it is the same, or as random, early and late. Lanes must be independent: initial states spread over states, not over
+rounding errors.
 
 Limits. A lane that leaves one chaotic set for another has not escaped here, and one in a laminar phase at its very end
 may seem to have. Weak chaos needs long blocks.
@@ -219,7 +219,7 @@ class Survival:
         counts = f"({n} of {self.chaotic} lanes escaped in {watched})"
         if not self.survived:
             return f"transient, mean life below {_number(high)} revolutions {counts}{others}"
-        error = f"+- {_number(self.standard_error)}" if n >= FEW else f"({_number(low)} to {_number(high)})"
+        error = f"± {_number(self.standard_error)}" if n >= FEW else f"({_number(low)} to {_number(high)})"
         return f"transient, mean life {_number(self.mean_life)} {error} revolutions {counts}{others}"
 
     _repr_html_ = notebook_html

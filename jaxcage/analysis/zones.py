@@ -46,7 +46,7 @@ class Edge:
 
     def __str__(self) -> str:
         if self.basis == "statistical":
-            return f"{self.speed_rpm:.0f} +- {self.uncertainty_rpm:.0f} rpm"
+            return f"{self.speed_rpm:.0f} ± {self.uncertainty_rpm:.0f} rpm"
         return f"{self.speed_rpm:.2f} rpm ({self.mechanism})"
 
     _repr_html_ = notebook_html
@@ -82,12 +82,12 @@ class Zone:
     onset: Edge | None
     exit: Edge | None
     share: float
-    """Mean over the zone's speeds of the share of starts that are chaotic while observed; where the synchronous orbit
-    was met, that settled on it; where it was lost, that did not."""
+    """Mean over the zone's speeds of the share of initial states that are chaotic while observed; where the synchronous
+    orbit was met, that settled on it; where it was lost, that did not."""
     life: tuple[MeanLife, MeanLife] | None = None
-    """Shortest and longest mean life of chaos at the zone's speeds, each from the starts there and next to it. Where
-    none of them left chaos only a lower bound is known, which may be the longest, but the shortest only if nothing
-    else is known. None where lanes were not followed."""
+    """Shortest and longest mean life of chaos at the zone's speeds, each from the initial states there and next to it.
+    Where none of them left chaos only a lower bound is known, which may be the longest, but the shortest only if
+    nothing else is known. None where lanes were not followed."""
 
     @property
     def width_rpm(self) -> float | None:
@@ -125,7 +125,7 @@ def _row(zone: Zone) -> str:
     width = "open" if zone.width_rpm is None else f"{zone.width_rpm:.0f} rpm wide"
     ends = f"{zone.onset or 'below the range'} to {zone.exit or 'above the range'}"
     life = "" if zone.life is None else lives_in_words(zone.life, lambda life: f"{life.revolutions:.0f}")
-    return f"{ends}, {width}, {zone.share:.0%} of starts chaotic{life and f', mean life {life} revolutions'}"
+    return f"{ends}, {width}, {zone.share:.0%} of initial states chaotic{life and f', mean life {life} revolutions'}"
 
 
 def runs(mask: Bool[np.ndarray, " speeds"]) -> list[tuple[int, int]]:
@@ -158,7 +158,7 @@ class _Speeds(NamedTuple):
     undecided: Bool[np.ndarray, " speeds"]
     """Known, but the other is possible too."""
     share: Float[np.ndarray, " speeds"]
-    """Share of the starts that do what the zone is named for."""
+    """Share of the initial states that do what the zone is named for."""
 
 
 def _edge(rpm: np.ndarray, at: _Speeds, inner: int, step: int, kind: str) -> Edge | None:

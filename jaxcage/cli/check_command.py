@@ -16,7 +16,7 @@ from .subject import RPM, Subject
 
 SPEEDS = 9
 """Speeds at which a bearing with its rollers is simulated."""
-LENGTH: dict[str, Any] = {"starts": 2, "discard": 30, "revolutions": 20, "blocks": 4, "exponents": 0}
+LENGTH: dict[str, Any] = {"initial_states": 2, "discard": 30, "revolutions": 20, "blocks": 4, "exponents": 0}
 Operating = Annotated[str, o.text(), tyro.conf.arg(help='Range of speed of the machine, e.g. "4000-14000 rpm shaft".')]
 
 
@@ -63,7 +63,7 @@ def _with_rollers(subject: Subject, ends: tuple[float, float]) -> Answer:
     jc.show.require_some(found)
     notes = jc.show.minimum_load_notes(subject.model.bearing, float(subject.model.load), ends[1] * RPM)
     notes += [f"{jc.show.MOTIONS[name]}: {words}" for name, words in jc.show.MOTION_WORDS.items()]
-    notes.append(f"{SPEEDS} speeds, {found.sizes['start']} initial states, {jc.analysis.length(found)}")
+    notes.append(f"{SPEEDS} speeds, {found.sizes['initial_state']} initial states, {jc.analysis.length(found)}")
     document = {"operating_rpm": [end * RPM for end in ends], "verdict": jc.show.cage_verdict(found)}
     over = f"{ends[0] * RPM:.0f} to {ends[1] * RPM:.0f} rpm of the {subject.own}"
     table = jc.show.motion_table(f"Motion of the cage of {subject.name}", found)

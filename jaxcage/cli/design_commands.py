@@ -85,7 +85,7 @@ def design(
             raise InputError(f"Option --operating {orbits}, but {subject.name} is a bearing.")
         if calm.operating is None:
             raise InputError(f"Option --search {search} goes with --operating.")
-        return _calm_design(subject, bounds, calm, notes, search=search, starts=searches, seed=seed)
+        return _calm_design(subject, bounds, calm, notes, search=search, searches=searches, seed=seed)
     given = {"wear": wear, "force": force, "impulse": impulse, "power": power, "slip": slip, "balance": balance}
     prices = {name: 1.0 if price is None else price for name, price in given.items()}
     if subject.with_rollers and not sum(prices.values()):
@@ -102,7 +102,7 @@ def design(
     names = subject.usual((d.BALANCE, *d.LAND_LOADS), d.COMPARED)
     compared |= {name: d.statistic(model, name) for name in names} | {d.OBJECTIVE: objective}
     length = {"batches": steps or subject.usual(10, 12), "batch": batch or subject.usual(12, 16)}
-    values, finer = objective.values(runs), objective.values(runs.fresh(1, starts=4))
+    values, finer = objective.values(runs), objective.values(runs.fresh(1, initial_states=4))
     told = {"confirm": finer, "seed": seed, "report": partial(report, "search")}
     found = d.surrogate_search(model, bounds, values, **length, **told)
     report("fresh runs", 0, 1)
@@ -128,9 +128,9 @@ def design(
 def _runs(subject: Subject, over: o.Range, means: o.MeanOptions, seed: int, progress: Any = None) -> Any:
     """Runs of designs, of a cage at speeds over a range."""
     if subject.with_rollers:
-        length = means.length(starts=4, discard=10, revolutions=20)
+        length = means.length(initial_states=4, discard=10, revolutions=20)
         return jc.design.Runs.of_bearing(subject.speed(means.speed), **length, seed=seed, progress=progress)
-    length: dict[str, Any] = means.length(starts=1, discard=150, revolutions=100)
+    length: dict[str, Any] = means.length(initial_states=1, discard=150, revolutions=100)
     if (speeds := subject.range(over, 48)).size < 2:
         raise InputError("Option --count must be at least 2, but 1 was given.")
     return jc.design.Runs(speeds, **length, progress=progress)
@@ -212,7 +212,7 @@ def sensitivity(
         known = jc.parameters(model)
         directions = [x for x in d.DIRECTIONS if all(float(known[each]) for each in x.split("+"))]
         length = means.length(discard=10, revolutions=20)
-        near = d.Runs(runs.speeds, starts=2, **length, blocks=2, exponents=0, tolerance=1e-4)
+        near = d.Runs(runs.speeds, initial_states=2, **length, blocks=2, exponents=0, tolerance=1e-4)
         spread = float(np.clip(tolerance / 100, 0.05, 0.3))
         found = d.mean_gradient(model, near, {of: value}, directions=directions, spread=spread, seed=seed)
         slopes = [(found.statistics[of], directions)]

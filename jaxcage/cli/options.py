@@ -204,7 +204,7 @@ class MeanOptions:
     speed: Annotated[float | None, _SPEED] = None
     """The speed, e.g. "10000 rpm shaft"."""
     load: Load = None
-    starts: OptionalCount = None
+    initial_states: OptionalCount = None
     """Initial states of each design."""
     discard: OptionalZero = None
     """Revolutions left out at the beginning."""

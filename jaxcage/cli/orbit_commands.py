@@ -226,7 +226,7 @@ def _of_means(
     given: dict[str, Any],
 ) -> Answer:
     """Derivatives of the means of runs at one speed, from pairs of designs around the given one."""
-    at, length = subject.speed(means.speed), means.length(starts=2, discard=20, revolutions=40)
+    at, length = subject.speed(means.speed), means.length(initial_states=2, discard=20, revolutions=40)
     told = {"tolerance": tolerance, "progress": partial(report, "designs")}
     runs = jc.design.Runs(at, **length, blocks=2, exponents=int(chaos), **told)
     statistics = (*jc.design.STATISTICS, *(["exponent"] if chaos else []))
@@ -253,7 +253,7 @@ def map_(
     lower: o.OptionalText = None,
     upper: o.OptionalText = None,
     points: o.Points = None,
-    starts: o.FromOne = 1,
+    initial_states: o.FromOne = 1,
     persist: o.FromZero = 0,
     no_points: bool = False,
     no_curves: bool = False,
@@ -267,7 +267,7 @@ def map_(
         lower: Lowest value of y, in SI units or with a unit, e.g. "0.4 mm"; 0.8 of its value if left out.
         upper: Highest value of y; 1.25 of its value if left out.
         points: Grid of points at which lanes are run, e.g. 300x300.
-        starts: Initial states at each point.
+        initial_states: Initial states at each point.
         persist: Revolutions that chaos must outlast to count.
         no_points: Follow the edges of the synchronous orbit only.
         no_curves: Do not follow the edges of the synchronous orbit.
@@ -294,7 +294,7 @@ def map_(
                 raise
             refused = {"edges": str(error).rstrip(".")}
     usual = subject.usual({"discard": 1000, "revolutions": 100, "blocks": 20}, {"discard": 20, "revolutions": 20})
-    settings = usual | run.settings | {"starts": starts, "persist": persist}
+    settings = usual | run.settings | {"initial_states": initial_states, "persist": persist}
     count = None if no_points else points or subject.usual((50, 12), (13, 8))
     return mapped(subject, subject.ends(over), axis, count, edges, refused, settings)
 

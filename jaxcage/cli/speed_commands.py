@@ -103,7 +103,12 @@ def swept(subject: Subject, speeds: Any, run: o.RunOptions) -> tuple[Any, Answer
     if names := [n for n in SHOWN if n in found]:
         tables.append(jc.show.quantities_table(f"Means over initial states, {title}", found, [*names, "exponent"]))
     document = {name: found.attrs[name] for name in ("discard", "revolutions", "horizon")}
-    document |= {"speeds": speeds.size, "starts": found.sizes["start"], "labels": counted(found), "too_short": short}
+    document |= {
+        "speeds": speeds.size,
+        "initial_states": found.sizes["initial_state"],
+        "labels": counted(found),
+        "too_short": short,
+    }
     document |= {"failed": jc.analysis.outcomes(found), "confirmed": json.loads(found.attrs["confirmed"])}
     document["error"] = float(np.nanmax(found["error"].values))
     files = {"figure": jc.show.sweep_figure(found, zones, subject.published, title), "data": found}
@@ -166,16 +171,19 @@ def poincare(
     settings: dict[str, Any] = run.settings | {"keep": run.revolutions, "progress": partial(report, "sweep")}
     found = jc.sweep(subject.model, np.array([at]), **settings)
     jc.show.require_some(found, f" at {subject.at(at)}")
-    starts = []
-    for i, lane in enumerate(found.isel(speed=0).transpose("start", ...)["strobe"]):
-        row = {name: str(found[name].values[0, i]) for name in ("label", "outcome")} | {"start": i + 1}
+    initial_states = []
+    for i, lane in enumerate(found.isel(speed=0).transpose("initial_state", ...)["strobe"]):
+        row = {name: str(found[name].values[0, i]) for name in ("label", "outcome")} | {"initial_state": i + 1}
         row |= {name: float(found[name].values[0, i, 0]) for name in ("exponents", "standard_error")}
-        starts.append(row | {name: lane.sel(component=name).values for name in ("y_C", "vy_C")})
+        initial_states.append(row | {name: lane.sel(component=name).values for name in ("y_C", "vy_C")})
     exponent = jc.show.Column("largest exponent per revolution", "exponents", error="standard_error")
-    title, names = f"{subject.name}, {subject.at(at)}", [f"start {row['start']}: {row['label']}" for row in starts]
+    title, names = (
+        f"{subject.name}, {subject.at(at)}",
+        [f"start {row['initial_state']}: {row['label']}" for row in initial_states],
+    )
     figure = jc.show.drawn(lambda ax: jc.show.strobe_section(found["strobe"].values[0], ax, names), 6.5, 5.4, title)
     title = f"Strobe section of {title}, {jc.analysis.length(found)}"
-    tables = [jc.show.table(title, starts, ["start", "label", exponent], "starts")]
+    tables = [jc.show.table(title, initial_states, ["initial_state", "label", exponent], "initial_states")]
     files, said = {"figure": figure, "data": jc.show.strobe_columns(found)}, " or ".join(counted(found))
     return Answer(f"At {subject.at(at)} the motion is {said}.", tables, [], subject.both(at), files, f"_{speed:g}rpm")
 
@@ -222,7 +230,7 @@ def _measured(subject: Subject, found: Any) -> Any:
     """The data set with the size of the orbit and the loads of the land, where the model does not report means."""
     if subject.with_rollers:
         return found
-    loads, dims = jc.design.land_loads(subject.model, found), ("speed", "start")
+    loads, dims = jc.design.land_loads(subject.model, found), ("speed", "initial_state")
     about = {"orbit_size": (jc.design.motions(subject.model, found)[0], "m")}
     about |= {"peak_land_force": (loads["peak land force"], "N"), "wear_load": (loads["wear load"], "N m/s")}
     return found.assign({name: (dims[: x.ndim], x, {"units": unit}) for name, (x, unit) in about.items()})
@@ -274,7 +282,7 @@ def study(
     vary: Annotated[o.Texts, tyro.conf.arg(metavar="NAME=VALUES")] = (),
     sample: o.FromZero = 0,
     seed: o.Seed = 0,
-    starts: o.OptionalCount = None,
+    initial_states: o.OptionalCount = None,
     exponents: o.OptionalCount = None,
     chunk: o.OptionalCount = None,
     shard: o.Shard = None,
@@ -287,7 +295,7 @@ def study(
         vary: Once for each parameter, `speed` among them. A grid: speed=4000rpm:27500rpm:100, or single values:
             oil=32,56,78 (ISO VG grades). Sampled: guidance_gap=0.3mm:0.6mm, or in a tolerance: eccentricity=20um±3um.
         sample: Number of samples, best a power of 2.
-        starts: Initial states at each point; all of the model's own if left out.
+        initial_states: Initial states at each point; all of the model's own if left out.
         exponents: Number of Lyapunov exponents.
         chunk: Lanes computed and stored together.
         shard: Part of the work, e.g. 2/4: every fourth chunk from the second on. All parts write to the same store.
@@ -296,7 +304,7 @@ def study(
     given, done = read_vary(vary, subject), []
     if np.prod([max(sample, 1.0), *(float(x.size) for x in given.values() if isinstance(x, np.ndarray))]) > MOST_POINTS:
         raise InputError(f"Options --vary and --sample must make at most {MOST_POINTS} points to run lanes at.")
-    settings: dict[str, Any] = {"samples": sample, "seed": seed, "starts": starts, "lanes": chunk}
+    settings: dict[str, Any] = {"samples": sample, "seed": seed, "initial_states": initial_states, "lanes": chunk}
     settings |= {"shard": shard or (1, 1)} | run.settings | ({} if exponents is None else {"exponents": exponents})
     advise("what is stored stays, and the same command goes on from there")
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..analysis import failed, restless, survival_at
-from ..lanes import initial_states, sweep
+from ..lanes import states_at, sweep
 from ..models import AbstractForcedSystem
 from .statistics import drawn_states
 
@@ -23,7 +23,7 @@ class Checked:
     where none ended."""
 
     speeds_rpm: Float[np.ndarray, " speeds"]
-    starts: int
+    initial_states: int
     shares: dict[str, float]
     failed: int
     chaotic_rpm: Float[np.ndarray, " chaotic"]
@@ -37,7 +37,7 @@ class Checked:
 
     def __str__(self) -> str:
         share = 100 * self.shares.get("periodic-1", 0.0)
-        said = f"{share:.1f} % of {self.starts} initial states at {self.speeds_rpm.size} speeds end calm"
+        said = f"{share:.1f} % of {self.initial_states} initial states at {self.speeds_rpm.size} speeds end calm"
         if not self.chaotic_rpm.size:
             return said
         low, high = f"{self.chaotic_rpm.min():.0f}", f"{self.chaotic_rpm.max():.0f} rpm of the cage"
@@ -50,18 +50,19 @@ class Checked:
 def check_design(
     model: AbstractForcedSystem,
     operating: tuple[float, float],
-    starts: int = 16,
+    initial_states: int = 16,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Checked:
-    """Simulate a design from its own initial states and from random ones, `starts` in all, over its operating range.
+    """Simulate a design from its own initial states and from random ones, `initial_states` in all, over its operating
+    range.
 
     The method is machine code with adaptive steps: other steps than those of the orbits that the search followed.
     """
     speeds = np.linspace(*operating, SPEEDS)
-    own = np.asarray(initial_states(model, speeds, None))[:, :starts]
-    states = np.concatenate([own, drawn_states(model, speeds, starts - own.shape[1], 0)], axis=1)
+    own = np.asarray(states_at(model, speeds, None))[:, :initial_states]
+    states = np.concatenate([own, drawn_states(model, speeds, initial_states - own.shape[1], 0)], axis=1)
     told = (lambda done, of: progress("check", done, of)) if progress else None
-    found = sweep(model, speeds, starts=states, progress=told)
+    found = sweep(model, speeds, initial_states=states, progress=told)
     labels, counts = np.unique(found["label"].values, return_counts=True)
     shares = dict(zip(labels.tolist(), (counts / counts.sum()).tolist(), strict=True))
     rpm, where = speeds * 30 / np.pi, np.flatnonzero(restless(found))

@@ -218,7 +218,7 @@ def design_for(
     objective: Literal["cost", "width"] = "cost",
     tolerance: Mapping[str, Tolerance] | None = None,
     search: Literal["slsqp", "augmented"] = "slsqp",
-    starts: int = 1,
+    searches: int = 1,
     seed: int = 0,
     check: int = 16,
     progress: Callable[[str, int, int], None] | None = None,
@@ -237,7 +237,7 @@ def design_for(
         no requirement, and of the others only `balance` may be given.
     - `tolerance`: what manufacture makes of parameters, varied or not; every requirement then holds for the worst.
     - `search`: `slsqp`, or `augmented` for optax's Adam on an augmented Lagrangian.
-    - `starts`, `seed`: searches, the first from the design itself, others from quasi-random places.
+    - `searches`, `seed`: searches, the first from the design itself, others from quasi-random places.
     - `check`: initial states from which the result is swept over the range, with other steps; 0 leaves it out.
 
     **Returns:** `Design`; if no design keeps all requirements, the one that falls short least, and which conflict.
@@ -245,7 +245,7 @@ def design_for(
     **Raises:** `ValueError` for a range without a stable orbit, or whose stable range does not end in bifurcations.
     """
     require_x64()
-    require_at_least(1, starts=starts)
+    require_at_least(1, searches=searches)
     require_at_least(0, check=check)
     low, high = operating
     if not 0 < low < high < float("inf"):
@@ -264,7 +264,7 @@ def design_for(
         range_ = OperatingRange(space, operating, keep.margin)
         problem = Problem(range_, listed(keep, model), cost_function(cost, model), free, tolerance)
     own = np.where(free, np.clip(space.place, 0, 1), space.place)
-    places = [own, *(problem.whole(x, own) for x in sobol(int(free.sum()), max(starts, 2), seed)[: starts - 1])]
+    places = [own, *(problem.whole(x, own) for x in sobol(int(free.sum()), max(searches, 2), seed)[: searches - 1])]
     told = lambda i: lambda done: say(f"search {i}", done, ITERATIONS)
     found = [SEARCHES[search](problem, begin, told(i)) for i, begin in enumerate(places, start=1)]
     best = min(found, key=lambda place: _merit(problem, place))

@@ -93,8 +93,8 @@ class Slopes:
 
     def __str__(self) -> str:
         rows = zip(self.directions, self.elasticity, self.elasticity_error, strict=True)
-        head = f"{self.name} {self.value:.4g} +- {self.value_error:.2g} {self.unit}"
-        return "\n".join([head, *(f"  {name:<28} {value:+.3f} +- {error:.3f}" for name, value, error in rows)])
+        head = f"{self.name} {self.value:.4g} ± {self.value_error:.2g} {self.unit}"
+        return "\n".join([head, *(f"  {name:<28} {value:+.3f} ± {error:.3f}" for name, value, error in rows)])
 
     _repr_html_ = notebook_html
 
@@ -287,15 +287,15 @@ class ToleranceBudget:
     def __str__(self) -> str:
         order = sorted(self.deviation.items(), key=lambda item: -item[1])
         total = self.total or 1.0  # without any scatter, nothing is a part of it
-        rows = [f"  {n:<24} +-{d:.3g} {self.unit}, {100 * (d / total) ** 2:.0f} % of the variance" for n, d in order]
-        head = f"{self.name} {self.value:.6g} {self.unit}: +-{1.96 * self.total:.3g} {self.unit} (95 %)"
+        rows = [f"  {n:<24} ±{d:.3g} {self.unit}, {100 * (d / total) ** 2:.0f} % of the variance" for n, d in order]
+        head = f"{self.name} {self.value:.6g} {self.unit}: ±{1.96 * self.total:.3g} {self.unit} (95 %)"
         return "\n".join([head, *rows])
 
 
 def tolerance_budget(of: Sensitivity | Slopes, deviation: Mapping[str, float]) -> ToleranceBudget:
     """Scatter of an edge from its exact derivatives, or of a statistic from its slopes.
 
-    **Arguments:** edge or statistic; standard deviation of each parameter relative to its value (a tolerance of +-t,
+    **Arguments:** edge or statistic; standard deviation of each parameter relative to its value (a tolerance of ±t,
     evenly used, has t/sqrt(3)).
 
     **Raises:** `ValueError` for a parameter without a derivative, or a negative deviation.

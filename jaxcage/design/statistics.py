@@ -60,7 +60,7 @@ class Runs:
 
     speeds: Speeds
     """Ascending speeds [rad/s], of a whole bearing its shaft's."""
-    starts: Any = 1
+    initial_states: Any = 1
     """Number of the model's own initial states, or initial states with which every design begins."""
     discard: int = 150
     revolutions: int = 100
@@ -69,7 +69,7 @@ class Runs:
     tolerance: float | None = None
     method: AbstractMethod | None = None
     seed: int | None = None
-    """Seed by which `starts` initial states are drawn in place of the model's own."""
+    """Seed by which `initial_states` initial states are drawn in place of the model's own."""
     progress: Progress | None = None
     keep: int = 1
     settled: int = 0
@@ -80,12 +80,12 @@ class Runs:
             raise ArgumentError("revolutions", said=said)
 
     @classmethod
-    def of_bearing(cls, speeds: Speeds, starts: Any = 4, discard: int = 10, revolutions: int = 20, **more: Any):
+    def of_bearing(cls, speeds: Speeds, initial_states: Any = 4, discard: int = 10, revolutions: int = 20, **more: Any):
         """Runs of a whole bearing in two blocks, from drawn positions of its cage; peaks are the largest in a block."""
         usual = {"blocks": 2, "exponents": 0, "tolerance": 1e-4, "seed": 0}
-        return cls(speeds, starts, discard, revolutions, **usual | more)
+        return cls(speeds, initial_states, discard, revolutions, **usual | more)
 
-    def fresh(self, number: int = 1, starts: int = 8) -> "Runs":
+    def fresh(self, number: int = 1, initial_states: int = 8) -> "Runs":
         """Runs for a check: other drawn initial states and other speeds of the range, twice as many, with twice as many
         revolutions left out and a tenth of the tolerance. Each `number` from 1 on draws anew."""
         speeds, seed = self.speed, (self.seed or 0) + number
@@ -94,7 +94,9 @@ class Runs:
             share[-1] = 1.0  # the balance grade is that of the highest speed
             speeds = speeds[0] + share * (speeds[-1] - speeds[0])
         finer = {"discard": 2 * self.discard, "tolerance": self.tolerance and self.tolerance / 10}
-        return dataclasses.replace(self, speeds=speeds, starts=starts, seed=seed, progress=None, **finer)
+        return dataclasses.replace(
+            self, speeds=speeds, initial_states=initial_states, seed=seed, progress=None, **finer
+        )
 
     @property
     def speed(self) -> Float[np.ndarray, " speeds"]:
@@ -105,10 +107,14 @@ class Runs:
         """The sweep of some designs."""
         names = ("discard", "revolutions", "blocks", "exponents", "tolerance", "method", "keep", "settled")
         settings = {name: getattr(self, name) for name in names}
-        starts = self.starts if self.seed is None else [(0.0,) * models[0].dimension] * self.starts
-        plan = Plan.over_speed(list(models), self.speed, starts)
+        initial_states = (
+            self.initial_states if self.seed is None else [(0.0,) * models[0].dimension] * self.initial_states
+        )
+        plan = Plan.over_speed(list(models), self.speed, initial_states)
         if self.seed is not None:
-            drawn = np.concatenate([drawn_states(model, self.speed, self.starts, self.seed) for model in models])
+            drawn = np.concatenate(
+                [drawn_states(model, self.speed, self.initial_states, self.seed) for model in models]
+            )
             plan = dataclasses.replace(plan, states=drawn.reshape(plan.states.shape))
         return run_lanes(plan, Run.of(models[0], confirm=False, horizon=0, **settings), self.progress)
 
@@ -125,7 +131,7 @@ def drawn_states(
 
 
 @compiled
-def _rolling_states(model: Any, speeds: Array, places: Array) -> Float[Array, "speeds starts dim"]:
+def _rolling_states(model: Any, speeds: Array, places: Array) -> Float[Array, "speeds initial_states dim"]:
     one = lambda speed, place: rolling_start(model, speed, place=place).row
     return jax.vmap(lambda speed: jax.vmap(lambda place: one(speed, place))(places))(speeds)
 
@@ -136,8 +142,8 @@ class Statistic:
 
     unit: str
     samples: Callable[[Models, xr.Dataset], Any]
-    """Function of designs and their sweep. It returns numbers of the shape (designs, speeds, starts, blocks), and the
-    mean of those of a design is its value."""
+    """Function of designs and their sweep. It returns numbers of the shape (designs, speeds, initial states, blocks),
+    and the mean of those of a design is its value."""
 
     def values(self, runs: Runs) -> Callable[[Models], Float[np.ndarray, " designs"]]:
         """Function that runs designs and returns the value of each; NaN where a lane failed."""
@@ -226,7 +232,9 @@ def bearing_objective(model: AbstractForcedSystem, runs: Runs, prices: Mapping[s
         each = statistic(model, name)
         now = each.samples([model], found)
         if not np.any(np.isfinite(now)):
-            raise ArgumentError("model", said="must run through from one of the starts at least, but fails from all.")
+            raise ArgumentError(
+                "model", said="must run through from one of the initial states at least, but fails from all."
+            )
         beside = max(float(np.nanmean(now)), _negligible(model, name, runs.speed))
         terms.append((price / total / beside if beside else 0.0, each.samples))
     return Statistic("1", lambda models, found: sum(by * samples(models, found) for by, samples in terms))

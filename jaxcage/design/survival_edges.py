@@ -76,7 +76,7 @@ def lasting_edge(
 
     **Arguments:** design; speed of the edge and its uncertainty, as a sweep gives them; parameters, each of which costs
     no more, but makes all answers less certain; designs of each of four rounds, each at a speed of its own, from all
-    starts of the model; mean life of chaos at the edge [revolutions]; seed; method and progress as in `sweep`.
+    initial states of the model; mean life of chaos at the edge [revolutions]; seed; method and progress as in `sweep`.
 
     **Returns:** `LastingEdge`; its `status` says where the numbers should not be used.
 
@@ -119,7 +119,7 @@ def lasting_edges(model: CageModel, zone: Zone, **options: object) -> dict[str, 
 
 def _escapes(
     designs: Models, rpm: Float[np.ndarray, " designs"], run: Run, progress: Progress | None
-) -> tuple[Float[np.ndarray, "designs starts"], int]:
+) -> tuple[Float[np.ndarray, "designs initial_states"], int]:
     """Revolutions after which the lanes of each design are calm; and revolutions to which they were followed."""
     found = run_lanes(Plan.one_speed_each(designs, rpm * math.pi / 30), run, progress)
     return found["escape"].values, found.attrs["horizon"]

@@ -60,7 +60,7 @@ def confirm(
     return rounds
 
 
-def _doubtful(label: Shaped[np.ndarray, "*designs speeds starts"]) -> Int[np.ndarray, " lanes"]:
+def _doubtful(label: Shaped[np.ndarray, "*designs speeds initial_states"]) -> Int[np.ndarray, " lanes"]:
     """Lanes to be confirmed, by their place in the raveled labels."""
     failed = np.isin(label, ("failed", "inaccurate"))
     near = ~np.char.startswith(label, "periodic") & ~failed

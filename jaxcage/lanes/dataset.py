@@ -1,6 +1,6 @@
 """The data set of a run: lanes over the axes of their plan, with units, words and provenance; stored by zarr.
 
-Variables, over the axes of the plan (`speed` and `start` of a sweep) and what stands in brackets:
+Variables, over the axes of the plan (`speed` and `initial_state` of a sweep) and what stands in brackets:
 
 | variable | contents |
 |---|---|

@@ -89,7 +89,7 @@ class Grid:
     samples: int
     seed: int
     """Of the scrambled Sobol sequence."""
-    starts: int
+    initial_states: int
     lanes: int = LANES
     """Lanes of a chunk, at most."""
 
@@ -112,7 +112,7 @@ class Grid:
                 "samples", said=f"needs an interval or a tolerance to sample, but {self.samples} was given."
             )
         require_at_least(0, seed=self.seed)
-        require_at_least(1, starts=self.starts, lanes=self.lanes)
+        require_at_least(1, initial_states=self.initial_states, lanes=self.lanes)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -123,7 +123,7 @@ class Grid:
     def axes(self) -> dict[str, int]:
         """Length of each axis by name, the slowest first."""
         sample = {SAMPLE: self.samples} if self.sampled else {}
-        return {**sample, **{name: len(values) for name, values in self.values.items()}, START: self.starts}
+        return {**sample, **{name: len(values) for name, values in self.values.items()}, START: self.initial_states}
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -187,8 +187,8 @@ class Grid:
                 pick(model, name)
         if OIL in self.names and not hasattr(model, "lubricant"):
             raise ArgumentError("vary", said=f"must not hold {OIL} for a model without oil.")
-        if self.starts > (own := len(model.starts(1.0))):
-            raise ArgumentError("starts", said=f"must be at most {own}, but {self.starts} was given.")
+        if self.initial_states > (own := len(model.initial_states(1.0))):
+            raise ArgumentError("initial_states", said=f"must be at most {own}, but {self.initial_states} was given.")
 
     def plan(self, model: AbstractForcedSystem, lanes: Int[np.ndarray, " lanes"] | None = None) -> Plan:
         """Some lanes of a model, on one axis `lane`; or all of them, over the axes of the grid."""
@@ -214,7 +214,7 @@ class Grid:
             "cloud": {name: _summary(values) for name, values in self.cloud.items()},
             "samples": self.samples,
             "seed": self.seed if self.sampled else None,
-            "starts": self.starts,
+            "initial_states": self.initial_states,
             "lanes": self.lanes,
         }
 

@@ -19,7 +19,7 @@ from ..solve import Lanes
 Speeds = float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"]
 States = int | Sequence[Any] | Float[np.ndarray, "speeds states dim"] | None
 """Initial states: how many of the model's own, states for every speed, or states of each speed; all of its own."""
-DESIGN, SPEED, START = "design", "speed", "start"
+DESIGN, SPEED, START = "design", "speed", "initial_state"
 
 
 @overload
@@ -77,7 +77,7 @@ class Plan:
         """
         models, speed = _models(designs), checked_speeds(speeds)
         require_speeds(models[0], speed, "speeds")
-        begin = np.stack([initial_states(model, speed, states) for model in models])
+        begin = np.stack([states_at(model, speed, states) for model in models])
         shape = begin.shape[:3]
         which, at = (np.repeat(x.ravel(), shape[2]) for x in np.indices(shape[:2]))
         axes: dict[str, int] = dict(zip((DESIGN, SPEED, START), shape, strict=True))
@@ -90,11 +90,11 @@ class Plan:
     def one_speed_each(cls, designs: Sequence[AbstractForcedSystem], speeds: Float[np.ndarray, " designs"]) -> "Plan":
         """Designs, each at a speed of its own [rad/s], from all of their initial states: axes `design` and `start`."""
         models = _models(designs)
-        begin = np.stack([initial_states(m, s, None)[0] for m, s in zip(models, speeds[:, None], strict=True)])
-        count, starts, _ = begin.shape
-        lanes = Lanes.of(models, np.repeat(speeds, starts), np.repeat(np.arange(count), starts))
-        axes = {DESIGN: count, START: starts}
-        return cls(lanes, begin.reshape(count * starts, -1), axes, {SPEED: ((DESIGN,), speeds)})
+        begin = np.stack([states_at(m, s, None)[0] for m, s in zip(models, speeds[:, None], strict=True)])
+        count, initial_states, _ = begin.shape
+        lanes = Lanes.of(models, np.repeat(speeds, initial_states), np.repeat(np.arange(count), initial_states))
+        axes = {DESIGN: count, START: initial_states}
+        return cls(lanes, begin.reshape(count * initial_states, -1), axes, {SPEED: ((DESIGN,), speeds)})
 
     @property
     def scale(self) -> Float[np.ndarray, "lanes dim"]:
@@ -122,7 +122,7 @@ def _models(designs: AbstractForcedSystem | Sequence[AbstractForcedSystem]) -> l
     return models
 
 
-def initial_states(
+def states_at(
     model: AbstractForcedSystem, speed: Float[np.ndarray, " speeds"], states: States
 ) -> Float[np.ndarray, "speeds states dim"]:
     """Initial states at each speed: the model's own, some of them, the same at every speed, or as given."""
@@ -130,23 +130,24 @@ def initial_states(
         own = Lanes.of([model], speed).each(own_states, np.arange(speed.size))
         if states is not None and not 1 <= states <= own.shape[1]:
             raise ArgumentError(
-                "starts", said=f"must be 1 to {own.shape[1]}, as many as the model has, but {states} was given."
+                "initial_states", said=f"must be 1 to {own.shape[1]}, as many as the model has, but {states} was given."
             )
         return own[:, :states]
     wanted = f"states of {model.dimension} numbers"
     if isinstance(states, np.ndarray):
         if states.ndim != 3 or states.shape[::2] != (speed.size, model.dimension):
             raise ArgumentError(
-                "starts", said=f"must hold {wanted} for each of {speed.size} speeds, but has shape {states.shape}."
+                "initial_states",
+                said=f"must hold {wanted} for each of {speed.size} speeds, but has shape {states.shape}.",
             )
         return states
     rows = [np.asarray(getattr(y, "row", y), dtype=float) for y in states]
     if not rows or any(row.shape != (model.dimension,) for row in rows):
-        raise ArgumentError("starts", said=f"must hold {wanted}, but holds {states}.")
+        raise ArgumentError("initial_states", said=f"must hold {wanted}, but holds {states}.")
     return np.broadcast_to(np.stack(rows), (speed.size, len(rows), model.dimension)).copy()
 
 
 def own_states(model: AbstractForcedSystem, speed: Any) -> Float[Array, "states dim"]:
     """Initial states that the model has at a speed."""
     row = lambda y: jnp.stack([jnp.asarray(c, dtype=float) for c in y])
-    return jnp.stack([row(y) for y in model.starts(speed)])
+    return jnp.stack([row(y) for y in model.initial_states(speed)])

@@ -64,7 +64,7 @@ def sweep(
     model: AbstractForcedSystem | Sequence[AbstractForcedSystem],
     speeds: Speeds,
     *,
-    starts: States = None,
+    initial_states: States = None,
     progress: Progress | None = None,
     **settings: Any,
 ) -> xr.Dataset:
@@ -76,8 +76,8 @@ def sweep(
     - `model`: a cage, a whole bearing, any system of one's own; or several designs that differ in their numbers only.
     - `speeds`: ascending speeds [rad/s], of a cage its own, of a whole bearing its shaft's; `jaxcage.rpm` makes them
         from revolutions per minute.
-    - `starts`: initial states, each a tuple of numbers, or an array with states of its own for each speed; or how many
-        of the model's own; by default all of these.
+    - `initial_states`: initial states, each a tuple of numbers, or an array with states of its own for each speed; or
+        how many of the model's own; by default all of these.
     - `progress`: called with lanes done and lanes in all.
     - `settings`: fields of `jaxcage.lanes.Run`, which names their defaults, such as `discard`, `revolutions`, `blocks`,
         `exponents`, `confirm`, `horizon` and `method`; or the `tolerance` of machine code, relative to state and scale.
@@ -90,5 +90,5 @@ def sweep(
     """
     require_x64()
     require_known("sweep", INSTEAD, model, speeds)
-    plan = Plan.over_speed(model, speeds, starts)
+    plan = Plan.over_speed(model, speeds, initial_states)
     return run_lanes(plan, Run.of(plan.model, **settings), progress)

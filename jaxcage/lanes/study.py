@@ -92,7 +92,7 @@ def study(
     store: str | Path,
     samples: int = 0,
     seed: int = 0,
-    starts: int | None = None,
+    initial_states: int | None = None,
     lanes: int | None = None,
     shard: Shard = (1, 1),
     progress: Progress | None = None,
@@ -113,7 +113,7 @@ def study(
         mineral oil.
     - `store`: the folder.
     - `samples`, `seed`: number of samples (a scrambled Sobol sequence; best a power of 2) and seed.
-    - `starts`: how many of the model's own initial states are run at each point, by default all.
+    - `initial_states`: how many of the model's own initial states are run at each point, by default all.
     - `lanes`: lanes of a chunk, at most; by default 2048, or fewer where a lane takes long.
     - `shard`: (i, n) runs every n-th chunk from the i-th on. All shards write to the same folder.
     - `progress`: called with lanes done and lanes in all, those that were stored before included.
@@ -128,7 +128,7 @@ def study(
     require_x64()
     sampled: dict[str, Between] = {each: how for each, how in vary.items() if isinstance(how, Between)}
     axes = {each: np.asarray(x, dtype=float) for each, x in vary.items() if each not in sampled}
-    own = len(model.starts(1.0)) if starts is None else starts
+    own = len(model.initial_states(1.0)) if initial_states is None else initial_states
     most = lanes or (LANES if model.samples == 1 else LANES // 42)
     run = Run.of(model, **{"keep": CLOSING, **settings, "confirm": False, "horizon": 0})
     about = Study(model, Grid(axes, sampled, samples, seed, own, most), run, name, version)
@@ -170,7 +170,7 @@ def label_map(
     y: Mapping[str, Float[np.ndarray, " y"]],
     *,
     speed: float | None = None,
-    starts: int = 1,
+    initial_states: int = 1,
     persist: int = 0,
     stage: Stage | None = None,
     **settings: Any,
@@ -182,7 +182,7 @@ def label_map(
     - `model`: a cage, a whole bearing or a system of one's own.
     - `x`, `y`: name and ascending values [SI] of a parameter each; `"speed"` is one.
     - `speed`: the speed [rad/s], if it is neither of them.
-    - `starts`: how many of the model's own initial states are run at each point.
+    - `initial_states`: how many of the model's own initial states are run at each point.
     - `persist`: revolutions that chaos must outlast to count: lanes found chaotic are run again with so many discarded,
         and what has died out by then was a transient. 0 turns this off.
     - `stage`: called as lanes are done.
@@ -201,7 +201,7 @@ def label_map(
             "x", "y", said=f"must have at least 2 values each, but have {len(x_value)}, {len(y_value)}."
         )
     fixed = {} if speed is None else {SPEED: np.array([speed])}
-    grid = Grid({x_name: x_value, y_name: y_value, **fixed}, {}, 0, 0, starts)
+    grid = Grid({x_name: x_value, y_name: y_value, **fixed}, {}, 0, 0, initial_states)
     grid.require_known(model)
     run = Run.of(model, **{"keep": CLOSING, **settings, "confirm": False, "horizon": 0})
     require_at_least(0, persist=persist)

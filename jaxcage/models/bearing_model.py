@@ -217,7 +217,7 @@ class BearingModel(AbstractForcedSystem):
     def scale(self, speed: Scalar) -> Float[Array, " dim"]:
         return state_scale(self, speed).row
 
-    def starts(self, speed: Scalar) -> tuple[Float[Array, " dim"], ...]:
+    def initial_states(self, speed: Scalar) -> tuple[Float[Array, " dim"], ...]:
         return tuple(_starts(self, jnp.asarray(speed)))
 
     def excursion(self, y: Any) -> Scalar:
@@ -302,7 +302,7 @@ CagePlace = tuple[float, float, float, float]
 CAGE_STARTS: tuple[CagePlace, ...] = ((0.0, -0.9, 0.0, 0.0), (0.4, 0.3, 0.0, 0.0), (-0.6, 0.1, 0.2, -0.3))
 """One start near the cage's lowest place, two inside the clearance."""
 WITHIN = 0.8
-"""Part of the clearance in which drawn starts lie."""
+"""Part of the clearance in which drawn initial states lie."""
 LEAST_DEPTH, LEAST_SPEED = 1e-5, 1e-3
 """Lower bounds of the scale: depth of a contact over the roller's diameter, cage speed over the radial frequency of the
 rollers."""

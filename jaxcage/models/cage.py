@@ -255,7 +255,7 @@ class CageModel(AbstractForcedSystem):
         n = self.dimension // 2
         return (self.clearance,) * n + (self.clearance * speed,) * n
 
-    def starts(self, speed: Scalar) -> tuple[State, ...]:
+    def initial_states(self, speed: Scalar) -> tuple[State, ...]:
         """The paper's start, cage at rest on the rib (X = 0, Y = -C_r/2), and two more inside the clearance."""
         c, zero = self.clearance, jnp.zeros_like(self.clearance)
         rib = (zero,) * (self.dimension // 2 - 2)

@@ -117,7 +117,7 @@ class _UsersSystem(AbstractForcedSystem):
     _starts: tuple[tuple[float, ...], ...] = eqx.field(static=True)
     _harmonics: int = eqx.field(static=True)
 
-    def _set(self, scale: Any, starts: Any, harmonics: int) -> None:
+    def _set(self, scale: Any, initial_states: Any, harmonics: int) -> None:
         """Keep what the user gave. **Raises:** `ValueError` for what does not fit the system."""
         n = self.dimension
         magnitudes = _finite((scale,) * n if np.ndim(scale) == 0 else scale, n)
@@ -125,11 +125,11 @@ class _UsersSystem(AbstractForcedSystem):
             said = f"must be a positive finite number or {n} of them, one for each component of the state"
             raise ArgumentError("scale", said=f"{said}, but {shown(scale)} was given.")
         rows = []
-        for start in starts:
+        for start in initial_states:
             rows.append(_finite(start, n))
             if rows[-1] is None:
                 said = f"must be states of {n} finite number{'s' if n > 1 else ''} each"
-                raise ArgumentError("starts", said=f"{said}, but {shown(start)} is among them.")
+                raise ArgumentError("initial_states", said=f"{said}, but {shown(start)} is among them.")
         if not 1 <= harmonics <= MOST_HARMONICS:
             said = f"must be a whole number from 1 to {MOST_HARMONICS}, but {shown(harmonics)} was given."
             raise ArgumentError("harmonics", said=said)
@@ -148,7 +148,7 @@ class _UsersSystem(AbstractForcedSystem):
     def scale(self, speed: Scalar) -> State:
         return tuple(jnp.asarray(s, dtype=float) for s in self._scale)
 
-    def starts(self, speed: Scalar) -> tuple[State, ...]:
+    def initial_states(self, speed: Scalar) -> tuple[State, ...]:
         return tuple(tuple(jnp.asarray(c, dtype=float) for c in s) for s in self._starts)
 
 
@@ -164,7 +164,7 @@ class ForcedSystem(_UsersSystem):
         rates: Callable[[Scalar, State, Scalar], State],
         dimension: int,
         scale: Scalar | Numbers = 1.0,
-        starts: Sequence[Numbers] | np.ndarray | Array = (),
+        initial_states: Sequence[Numbers] | np.ndarray | Array = (),
         harmonics: int = 1,
     ):
         """**Arguments:** `rates(tau, y, speed)`, a function or a module (whose arrays are then differentiable
@@ -175,7 +175,7 @@ class ForcedSystem(_UsersSystem):
         """
         require_at_least(1, dimension=dimension)
         self.rates, self._dimension = rates, dimension
-        self._set(scale, starts, harmonics)
+        self._set(scale, initial_states, harmonics)
         require_repeats(_RATES, rates, [(y,) for y in self._probes])
 
     @property
@@ -206,7 +206,7 @@ class ForcedOscillator(_UsersSystem):
         acceleration: Callable[[Scalar, State, State, Scalar], State],
         coordinates: int,
         scale: Scalar | Numbers = 1.0,
-        starts: Sequence[Numbers] | np.ndarray | Array = (),
+        initial_states: Sequence[Numbers] | np.ndarray | Array = (),
         harmonics: int = 1,
     ):
         """**Arguments:** `acceleration(tau, q, v, speed)`, a function or a module (whose arrays are then differentiable
@@ -218,7 +218,7 @@ class ForcedOscillator(_UsersSystem):
         """
         require_at_least(1, coordinates=coordinates)
         self.acceleration, self.coordinates = acceleration, coordinates
-        self._set(scale, starts, harmonics)
+        self._set(scale, initial_states, harmonics)
         require_repeats(_ACCELERATION, acceleration, [(y[:coordinates], y[coordinates:]) for y in self._probes])
 
     @property

@@ -146,7 +146,7 @@ class AbstractForcedSystem(eqx.Module):
         """Characteristic magnitude of each state component: tolerances and tangent vectors are measured in it."""
 
     @abc.abstractmethod
-    def starts(self, speed: Scalar) -> tuple[Any, ...]:
+    def initial_states(self, speed: Scalar) -> tuple[Any, ...]:
         """Initial states a sweep runs from unless told otherwise, the conventional one first."""
 
     def excursion(self, y: Any) -> Scalar:

@@ -74,7 +74,7 @@ class Branch:
             f"ends: {', '.join(self.ended)}"
         )
         rows = [
-            f"  {p.kind:<16} {p.parameter} = {p.value:.8g} +- {p.error:.1g}, multiplier {p.critical:.4f}, {p.status}"
+            f"  {p.kind:<16} {p.parameter} = {p.value:.8g} ± {p.error:.1g}, multiplier {p.critical:.4f}, {p.status}"
             for p in self.special
         ]
         return "\n".join([head, *rows])
@@ -124,7 +124,7 @@ def branch(
 
 def follow_both_ways(
     problem: ContinuationProblem,
-    starts: Sequence[Start],
+    guesses: Sequence[Start],
     control: StepControl,
     patience: int | float = math.inf,
     events: Sequence[Event] = (),
@@ -136,9 +136,9 @@ def follow_both_ways(
 
     **Returns:** None for a start that is not near an orbit, or lies on the branch of an earlier one.
     """
-    problem = problem.around(starts[0][1]).with_stable_steps(starts[0])
-    first = problem.orbits_near(starts)
-    count = len(starts)
+    problem = problem.around(guesses[0][1]).with_stable_steps(guesses[0])
+    first = problem.orbits_near(guesses)
+    count = len(guesses)
     taken = ~first.converged
     unstable = [0] * (2 * count)
 
@@ -253,11 +253,11 @@ class Cascade:
 
     def __str__(self) -> str:
         rows = [
-            f"  period {int(p.periods)} to {2 * int(p.periods)}: {float(p.value):.10g} +- {float(p.error):.1g}"
+            f"  period {int(p.periods)} to {2 * int(p.periods)}: {float(p.value):.10g} ± {float(p.error):.1g}"
             for p in self.points
         ]
         last = [f"  ended: {self.ended}"] if self.ended else []
-        return "\n".join(["Period-doubling cascade", *rows, f"  limit {self.limit:.10g} +- {self.error:.1g}", *last])
+        return "\n".join(["Period-doubling cascade", *rows, f"  limit {self.limit:.10g} ± {self.error:.1g}", *last])
 
     _repr_html_ = notebook_html
 

@@ -84,9 +84,9 @@ class ContinuationProblem(eqx.Module):
             return self
         return self.by_rodas4()
 
-    def orbits_near(self, starts: Sequence[Start], likely: np.ndarray | None = None) -> Points:
+    def orbits_near(self, guesses: Sequence[Start], likely: np.ndarray | None = None) -> Points:
         """Find orbits near states at fixed values of the parameter (see `first_points` for `likely`)."""
-        u = np.array([self.unknowns(state, value) for state, value in starts])
+        u = np.array([self.unknowns(state, value) for state, value in guesses])
         return first_points(self, u, np.eye(1, u.shape[1], u.shape[1] - 1).repeat(len(u), axis=0), likely=likely)
 
     def unknowns(self, state: Any, *values: float) -> np.ndarray:

@@ -79,7 +79,7 @@ class Sensitivity:
     def __str__(self) -> str:
         order = sorted(self.elasticity, key=lambda n: -abs(self.elasticity[n]))
         rows = [f"  {n:<28} {self.elasticity[n]:+.6f}" for n in order if self.elasticity[n] != 0.0]
-        at = f"{self.kind} at {self.value_rpm:.3f} +- {self.error_rpm:.1g} rpm"
+        at = f"{self.kind} at {self.value_rpm:.3f} ± {self.error_rpm:.1g} rpm"
         return "\n".join([f"{self.name}: {at}, elasticities", *rows])
 
     _repr_html_ = notebook_html

@@ -255,7 +255,7 @@ def periodic_orbit(
 
     - `system`, `speed`: any forced system, and its speed [rad/s].
     - `periods`: revolutions after which the orbit closes.
-    - `guess`: a state [SI] near the orbit, or an `Orbit`; by default the first of the system's own starts.
+    - `guess`: a state [SI] near the orbit, or an `Orbit`; by default the first of the system's own initial states.
     - `revolutions`: revolutions of simulation before Newton's method; by default 200 without a guess, none with one.
     - `method`: integration method; by default as many steps as the orbit needs, by Runge-Kutta or, if that finds no
         orbit that stays where it is with more steps, by Rodas4 (never under `jit` and `vmap`).
@@ -293,7 +293,7 @@ def periodic_orbit(
 
 def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Guess | None) -> Float[Array, " dim"]:
     """Return a guess as an array, without derivative."""
-    given: Any = system.starts(speed)[0] if guess is None else guess
+    given: Any = system.initial_states(speed)[0] if guess is None else guess
     wanted = f"must be a state of {system.dimension} numbers"
     try:
         state = given.state if isinstance(given, Orbit) else jnp.stack([jnp.asarray(c, dtype=float) for c in given])

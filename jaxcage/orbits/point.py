@@ -216,10 +216,10 @@ class Point(eqx.Module):
             looked = f"; {self.looked}" if self.looked else ""
             return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e}){looked}"
         angle = f", angle {np.degrees(self.angle):.2f} deg" if self.kind == "Neimark-Sacker" else ""
-        error = f" +- {float(self.error_rpm):.1g}" if self.parameter == SPEED else ""
+        error = f" ± {float(self.error_rpm):.1g}" if self.parameter == SPEED else ""
         return (
             f"{self.kind} at {float(self.speed_rpm):.3f}{error} rpm, {self.parameter} = {float(self.value):.9g} "
-            f"+- {float(self.error):.1g}{angle}, {int(self.steps)} steps\n"
+            f"± {float(self.error):.1g}{angle}, {int(self.steps)} steps\n"
             f"  residual {float(self.residual):.1e}, transversality {float(self.transversality):.3g}, {self.status}"
         )
 

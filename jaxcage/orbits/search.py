@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from .._arguments import require_at_least
-from ..lanes import initial_states, sweep
+from ..lanes import states_at, sweep
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import AbstractMethod
@@ -196,8 +196,10 @@ def synchronous_orbits(
     scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
 
     def simulate(speeds: np.ndarray, sign: float) -> xr.Dataset:
-        starts, told = sign * initial_states(system, speeds, None), lambda done, of: say("simulations", done, of)
-        return sweep(system, speeds, starts=starts, discard=discard, **SHORT, method=method, progress=told)
+        initial_states, told = sign * states_at(system, speeds, None), lambda done, of: say("simulations", done, of)
+        return sweep(
+            system, speeds, initial_states=initial_states, discard=discard, **SHORT, method=method, progress=told
+        )
 
     settled = simulate(np.linspace(lower, upper, count), 1.0) if settled is None else settled
     speeds = settled["speed"].values
@@ -214,8 +216,8 @@ def synchronous_orbits(
             break
         say("branches", turn, ROUNDS)
         picked = np.unique(np.linspace(0, len(waiting) - 1, min(ROUND, len(waiting))).round().astype(int))
-        starts = [(waiting[i].state, waiting[i].speed) for i in picked]
-        branches += [b for b in follow_both_ways(problem, starts, StepControl(most=1500), PATIENCE) if b is not None]
+        guesses = [(waiting[i].state, waiting[i].speed) for i in picked]
+        branches += [b for b in follow_both_ways(problem, guesses, StepControl(most=1500), PATIENCE) if b is not None]
         waiting = [w for w in waiting if not any(_covers(b, w.speed, w.state, scale) for b in branches)]
     say("branches", ROUNDS, ROUNDS)
     families, stretches, limits = _families(branches, scale), [], (lower * 30 / np.pi, upper * 30 / np.pi)
@@ -300,7 +302,7 @@ def _stable_parts(branch: Branch, number: int, limits: tuple[float, float]) -> l
 
 
 def _merged(parts: Sequence[StableRange], scale: Scale) -> list[StableRange]:
-    """Return the parts with those joined that two branches from different starts share."""
+    """Return the parts with those joined that two branches from different initial states share."""
     whole: list[StableRange] = []
     for b in sorted(parts, key=lambda p: p.lower_rpm):
         for i, a in enumerate(whole):

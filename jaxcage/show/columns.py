@@ -59,8 +59,8 @@ def roller_columns(history: "RollerHistory") -> Columns:
 
 def strobe_columns(found: xr.Dataset) -> Columns:
     """Strobe points of all lanes of a sweep at its first speed."""
-    states = found["strobe"].isel(speed=0).stack(point=("start", "revolution")).transpose("point", "component")
-    columns = {"start": states["start"].values + 1, "revolution": states["revolution"].values}
+    states = found["strobe"].isel(speed=0).stack(point=("initial_state", "revolution")).transpose("point", "component")
+    columns = {"initial_state": states["initial_state"].values + 1, "revolution": states["revolution"].values}
     return columns | _of_states(states.values)
 
 

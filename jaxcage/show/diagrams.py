@@ -179,7 +179,7 @@ def exponent_strip(sweep: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.plot(np.repeat(rpm, largest.shape[1]), largest.ravel(), **style.dots(style.GREY, 3), label="each start")
     shade = {"color": style.SKY, "alpha": 0.5, "linewidth": 0, "label": "±2 standard errors"}
     ax.fill_between(rpm, top - band, top + band, **shade)
-    ax.plot(rpm, top, color=style.BLUE, linewidth=0.9, label="largest of the starts")
+    ax.plot(rpm, top, color=style.BLUE, linewidth=0.9, label="largest of the initial states")
     ax.set(xlim=speed_limits(sweep), ylim=_exponent_limits(largest, top, band))
     ax.set_ylabel("largest exponent\nper revolution " + quantity("largest_exponent").symbol)
     return label_speed(ax, sweep)

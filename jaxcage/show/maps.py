@@ -188,7 +188,7 @@ def map_figure(axis: Axis, curves: Sequence[Curve], found: xr.Dataset | None, ti
         ax.set_title("Largest exponent", fontsize=10, loc="left", pad=20 if curves else 6)
 
     def means(ax: Axes, name: str) -> None:
-        column, z = column_of(found, name), found[name].mean("start", skipna=True).values
+        column, z = column_of(found, name), found[name].mean("initial_state", skipna=True).values
         wide = np.nanmin(z) > 0 and np.nanmax(z) > 20 * np.nanmin(z)
         drawn = ax.pcolormesh(*borders, column.scale * z.T, cmap="viridis", norm=LogNorm() if wide else None)
         ax.figure.colorbar(drawn, ax=ax)

@@ -119,7 +119,7 @@ def run_figure(model: Any, run: Trajectory, rollers: Rollers | None, title: str 
 
 
 def strobe_section(
-    states: Float[np.ndarray, "starts revolutions dim"], ax: Axes | None = None, names: Sequence[str] = ()
+    states: Float[np.ndarray, "initial_states revolutions dim"], ax: Axes | None = None, names: Sequence[str] = ()
 ) -> Axes:
     """Strobe states in the plane of vertical displacement and velocity, one colour for each initial state.
 

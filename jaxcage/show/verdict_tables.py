@@ -30,7 +30,7 @@ def range_sentence(over: str, chance: RangeChance | None, checked: Checked | Non
         )
     assert checked is not None
     if checked.calm:
-        return f"Calm: over {over} all {checked.starts} initial states end on the calm motion at every speed."
+        return f"Calm: over {over} all {checked.initial_states} initial states end on the calm motion at every speed."
     share = checked.shares.get("periodic-1", 0.0)
     if share == 0:
         return f"The cage rattles: over {over} no simulation ends on a calm motion."

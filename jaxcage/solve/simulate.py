@@ -121,7 +121,7 @@ class Trajectory:
 def _start(system: AbstractForcedSystem, speed: float, start: Start | None) -> np.ndarray:
     """The first state, with the quantities beside it behind."""
     dim = system.dimension
-    y0, beside = system.first_state(system.starts(jnp.asarray(speed))[0] if start is None else start)
+    y0, beside = system.first_state(system.initial_states(jnp.asarray(speed))[0] if start is None else start)
     if y0.shape != (dim,):
         raise ArgumentError("start", said=f"must be a state of {dim} numbers, but has {y0.size}.")
     if not np.all(np.isfinite(y0)):
