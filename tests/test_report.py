@@ -141,7 +141,7 @@ def test_page_is_well_formed_and_needs_nothing_from_outside(text: str):
 
 def test_page_says_what_was_found(text: str):
     words = " ".join(re.sub(r"<[^>]*>", " ", re.sub(r"<style>.*?</style>", "", text, flags=re.S)).split())
-    assert "Unstable ranges of the synchronous orbit of 1a" in words and f"{12000 / RATIO:.0f}" in words
+    assert "Unstable ranges of the synchronous orbit of 1a" in words and f"{12000 / RATIO:.2f}" in words
     assert "2 zones of chaos." in words and "jaxcage report 1a" in words
 
 

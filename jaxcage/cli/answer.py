@@ -40,6 +40,8 @@ class Answer:
     """More for programs, in SI units unless a name ends in another one."""
     files: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """Key in the document -> a figure, columns of numbers, a data set or a text; or the path of one already written."""
+    details: Sequence[str] = ()
+    """Notes that are printed on request only."""
     part: str = ""
     """Addition to the name of the case in names of files."""
     by_ranges: bool = False
@@ -86,8 +88,9 @@ def write(path: Path, content: Any) -> Path:
     return path
 
 
-def print_answer(answer: Answer, as_json: bool) -> None:
-    """Print an answer on standard output: one JSON document, or the sentence, the tables and the notes.
+def print_answer(answer: Answer, as_json: bool, details: bool = False) -> None:
+    """Print an answer on standard output: one JSON document, or the sentence, the tables and the notes, with `details`
+    all of them.
 
     **Raises:** `OSError` for a standard output that takes nothing.
     """
@@ -96,7 +99,11 @@ def print_answer(answer: Answer, as_json: bool) -> None:
     if as_json:
         text = json.dumps(plain(answer.document), indent=2, allow_nan=False)
     else:
-        text = "\n\n".join([answer.sentence, *map(str, answer.tables), "\n".join(answer.notes)])
+        tables = [table for table in answer.tables if details or not table.detail]
+        notes = [*(answer.details if details else ()), *answer.notes]
+        if len(tables) < len(answer.tables) or (answer.details and not details):
+            notes.append("More tables and notes: --details")
+        text = "\n\n".join([answer.sentence, *map(str, tables), "\n".join(notes)])
     try:
         text.encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:

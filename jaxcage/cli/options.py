@@ -248,6 +248,8 @@ class ShowOptions:
 
     out: Annotated[str, text("name a folder")] = "out"
     """Folder for figures and data; it is made if need be."""
+    details: bool = False
+    """Print all tables and notes, and not only those that decide."""
     json: bool = False
     """Print one JSON document on standard output instead of tables."""
     no_cache: bool = False

@@ -12,7 +12,7 @@ from .._errors import ArgumentError, InputError, NoResult
 from . import options as o
 from .answer import Answer
 from .progress import report
-from .speed_commands import chances, counted, said_of, swept
+from .speed_commands import chances, counted, said_of, swept, transient_notes
 from .subject import RPM, Subject
 
 
@@ -54,8 +54,8 @@ def explained(
         jc.show.unstable_table(name, orbits, loss, subject.published, beside),
         *([jc.show.elasticities_table(name, slopes, beside)] if slopes else []),
     ]
-    notes = [*jc.show.source_notes(known), *jc.show.unsettled_notes(orbits), *answer.notes]
-    said = said_of(found, known.zones)
+    notes = [*transient_notes(subject, known.zones), *jc.show.source_notes(known), *jc.show.unsettled_notes(orbits)]
+    said = said_of(subject, found, known.zones)
     return dataclasses.replace(answer, sentence=said, tables=tables, notes=notes), known.zones, slopes
 
 
@@ -116,7 +116,7 @@ def of_orbits(subject: Subject, found: Any, loss: Any) -> Answer:
         f"Further bifurcations, on unstable parts: {len(found.points) - len(found.edges)} (listed by --json)",
         f"Settled orbits that are on no branch: {found.missed}",
     ]
-    without = ", ".join(map(jc.show.zone_words, loss.zones)) or "none"
+    without = ", ".join(jc.show.zone_words(zone, beside) for zone in loss.zones) or "none"
     said = f"The synchronous orbit is stable in {len(found.stretches)} ranges of speed; zones without it: {without}."
     document = {"points": [jc.show.point_record(p, found) for p in found.points], "missed": found.missed}
     return Answer(said, tables, notes, document, files)
@@ -242,7 +242,7 @@ def _of_means(
         notes.append(f"Zero in every run: {', '.join(absent)}")
     document = subject.both(at) | length | {n: getattr(found, n) for n in ("pairs", "failed", "inaccurate")}
     files, tables = {"figure": jc.show.statistic_bars(found, title)}, jc.show.mean_gradient_tables(title, found)
-    return Answer(said, tables, notes, document, files, f"_{means.speed:g}rpm")
+    return Answer(said, tables, notes, document, files, part=f"_{means.speed:g}rpm")
 
 
 def map_(
@@ -285,15 +285,17 @@ def map_(
     edges, refused = {}, {}
     if no_points:
         subject.require_orbits("map --no-points")
+    usual = subject.usual({"discard": 1000, "revolutions": 100, "blocks": 20}, {"discard": 20, "revolutions": 20})
+    discard = usual["discard"] if run.discard is None else run.discard
+    if 0 < persist <= discard:
+        raise ArgumentError("persist", said=f"must be 0 or above the {discard} discarded, but is {persist}.")
     if curves:
         try:
-            discard = 1000 if run.discard is None else run.discard
             edges = _searched(subject, over, discard, run.method, "follow")[1].edges
         except NoResult as error:
             if no_points:
                 raise
             refused = {"edges": str(error).rstrip(".")}
-    usual = subject.usual({"discard": 1000, "revolutions": 100, "blocks": 20}, {"discard": 20, "revolutions": 20})
     settings = usual | run.settings | {"initial_states": initial_states, "persist": persist}
     count = None if no_points else points or subject.usual((50, 12), (13, 8))
     return mapped(subject, subject.ends(over), axis, count, edges, refused, settings)
@@ -329,4 +331,4 @@ def mapped(
     files["figure"] = jc.show.map_figure(axis, curves, found, title)
     notes = [f"Not followed: {edge} ({why})" for edge, why in (refused | lost).items()]
     said = f"Over speed and {y}: {', '.join(said) or 'no edge could be followed'}."
-    return Answer(said, tables, notes, document, files, f"_speed_{y}")
+    return Answer(said, tables, notes, document, files, part=f"_speed_{y}")

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 
 FILES_ARE_WHOLE = "files of earlier runs are as they were, and the same command starts over"
-SECONDS_BETWEEN_LINES = 60.0
+SECONDS_BETWEEN_LINES = 10.0
 ENDS = (signal.SIGINT, signal.SIGTERM)
 """Signals by which a command is told to end."""
 _SHOW_CURSOR_AND_CLEAR_LINE = "\x1b[?25h\r\x1b[2K"
@@ -92,17 +92,17 @@ def _on_interruption(number: int, frame: FrameType | None) -> None:
 
 @contextlib.contextmanager
 def progress(text: str) -> Iterator[None]:
-    """Around a computation: a bar in a terminal, and a line every minute elsewhere."""
+    """Around a computation: a bar in a terminal, and a line every ten seconds elsewhere."""
     global _advice, _report
     advise(FILES_ARE_WHOLE)
     try:
-        with _bar(text) if sys.stderr.isatty() else contextlib.nullcontext(_line_a_minute(text)) as _report:
+        with _bar(text) if sys.stderr.isatty() else contextlib.nullcontext(_line_now_and_then(text)) as _report:
             yield
     finally:
         _advice, _report = None, lambda stage, done, total: None
 
 
-def _line_a_minute(text: str) -> Report:
+def _line_now_and_then(text: str) -> Report:
     stage, began, first, said = "", time.monotonic(), 0, time.monotonic()
 
     def report(what: str, done: int, total: int) -> None:

@@ -65,7 +65,7 @@ def simulate(
     note = f"Error of a revolution: at most {found.error:.0e} of the scale ({found.outcome})"
     files = {"figure": jc.show.run_figure(model, found, rollers, title), "data": columns}
     tables = jc.show.run_tables(title, measures, rollers)
-    return Answer(f"At {where}: {said}.", tables, [note], document, files, f"_{speed:g}rpm")
+    return Answer(f"At {where}: {said}.", tables, [note], document, files, part=f"_{speed:g}rpm")
 
 
 def sweep(
@@ -112,7 +112,8 @@ def swept(subject: Subject, speeds: Any, run: o.RunOptions) -> tuple[Any, Answer
     document |= {"failed": jc.analysis.outcomes(found), "confirmed": json.loads(found.attrs["confirmed"])}
     document["error"] = float(np.nanmax(found["error"].values))
     files = {"figure": jc.show.sweep_figure(found, zones, subject.published, title), "data": found}
-    return found, Answer(said_of(found, zones), tables, [jc.summary(found)], document, files)
+    said, notes = said_of(subject, found, zones), transient_notes(subject, zones)
+    return found, Answer(said, tables, notes, document, files, details=[jc.summary(found)])
 
 
 def counted(found: Any) -> dict[str, int]:
@@ -125,20 +126,28 @@ def zones_of(found: Any) -> Any:
     return jc.zones(found) if "strobe" in found else jc.stretches(found)
 
 
-def said_of(found: Any, zones: Any) -> str:
+def said_of(subject: Subject, found: Any, zones: Any) -> str:
     """The zones in a sentence."""
-    rpm = found["rpm"].values
+    whose, ratio = subject.beside or (subject.own, 1.0)
+    rpm = ratio * found["rpm"].values
     between = f"between {rpm[0]:.0f} and {rpm[-1]:.0f} rpm" if rpm.size > 1 else f"at {rpm[0]:.0f} rpm"
+    between = f"{between} of the {whose}"
     if "strobe" not in found:
         chaotic = sum(zone.speeds for zone in zones if zone.chaotic)
         each = (f"{' or '.join(z.labels)} {z.low_rpm:.0f} to {z.high_rpm:.0f} rpm" for z in zones)
         of = jc.show.counted(rpm.size, "speed")
         said = f"The largest exponent is positive beyond doubt at {chaotic} of {of} {between}"
         return f"{said}; motion: {', '.join(each)}."
-    lasts = f" that lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
-    dies = f"; {len(zones.transient)} of chaos that dies out" if zones.transient else ""
-    count, each = len(zones.zones), ", ".join(map(jc.show.zone_words, zones.zones))
-    return f"{count or 'No'} zone{'s' * (count != 1)} of chaos{lasts} {between}{each and ': '}{each}{dies}."
+    each = ", ".join(jc.show.zone_words(zone, subject.beside) for zone in zones.zones)
+    lasts = f", in which chaos lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
+    count = jc.show.counted(len(zones.zones), "chaotic zone") if zones.zones else "No chaotic zone"
+    return f"{count} {between}{each and f': {each}'}{lasts if each else ''}."
+
+
+def transient_notes(subject: Subject, zones: Any) -> list[str]:
+    """The ranges of chaos that dies out, in a sentence."""
+    each = ", ".join(jc.show.zone_words(zone, subject.beside) for zone in getattr(zones, "transient", ()))
+    return [f"Transient chaos, with a mean life below {zones.horizon} revolutions: {each}"] if each else []
 
 
 def chances(subject: Subject, over: o.Range, draws: int, seed: int, run: o.RunOptions) -> Answer:
@@ -185,7 +194,9 @@ def poincare(
     title = f"Strobe section of {title}, {jc.analysis.length(found)}"
     tables = [jc.show.table(title, initial_states, ["initial_state", "label", exponent], "initial_states")]
     files, said = {"figure": figure, "data": jc.show.strobe_columns(found)}, " or ".join(counted(found))
-    return Answer(f"At {subject.at(at)} the motion is {said}.", tables, [], subject.both(at), files, f"_{speed:g}rpm")
+    return Answer(
+        f"At {subject.at(at)} the motion is {said}.", tables, [], subject.both(at), files, part=f"_{speed:g}rpm"
+    )
 
 
 def compare(
@@ -214,7 +225,7 @@ def compare(
         designs[each.name] |= {n: mean for n, (mean, _) in own.items()}
         designs[each.name] |= {f"{n}_error": error for n, (_, error) in own.items()}
         means.append({n: float(np.nanmean(mean)) for n, (mean, _) in own.items()})
-        said.append(f"{each.name}: {said_of(data, zones_of(data))}")
+        said.append(f"{each.name}: {said_of(each, data, zones_of(data))}")
         tables += jc.show.motion_tables(each.name, data, zones_of(data), each.published, each.beside)
     rows = [{"measure": n.replace("_", " "), **{x: m[n] for x, m in zip(names, means, strict=True)}} for n in means[0]]
     tables = [
@@ -223,7 +234,7 @@ def compare(
         *(dataclasses.replace(table, key="") for table in tables),
     ]
     files = {"figure": jc.show.quantities_beside(names, found, list(means[0]), title=" and ".join(names))}
-    return Answer(" ".join(said), tables, [], {"cases": names, "designs": designs}, files, f"_{names[1]}")
+    return Answer(" ".join(said), tables, [], {"cases": names, "designs": designs}, files, part=f"_{names[1]}")
 
 
 def _measured(subject: Subject, found: Any) -> Any:

@@ -69,8 +69,8 @@ class Subject:
 
     @property
     def beside(self) -> tuple[str, float] | None:
-        """The speed that tables show beside the model's, and its ratio to it."""
-        return None if self.shaft is None else ("shaft", self.shaft)
+        """The speed that tables show in place of the model's, and its ratio to it; None for the model's."""
+        return None if self.shaft is None or self.speeds == self.own else ("shaft", self.shaft)
 
     def both(self, speed: Any) -> dict[str, Any]:
         """Speeds of the model [rad/s] as speeds of cage and shaft [rpm], for a document."""

@@ -103,7 +103,7 @@ def _run(call: functools.partial[Answer]) -> None:
         if "RESOURCE_EXHAUSTED" in str(error):
             raise MemoryError from error
         raise
-    print_answer(answer, call.keywords["json"] if show is None else show.json)
+    print_answer(answer, call.keywords["json"] if show is None else show.json, show is not None and show.details)
     if answer.failure:
         raise NoResult(answer.failure)
 

@@ -141,10 +141,10 @@ def assess(
 
 def verdict_table(name: str, assessed: Sequence[tuple[Operating, dict[str, Verdict]]], beside: Beside = None) -> Table:
     """Operating speeds, and those of the shaft, with the verdicts on them."""
-    other, ratio = beside or ("", math.nan)
+    ratio = 1.0 if beside is None else beside[1]
     rows = [
         vars(v)
-        | {"speed": str(at), other: str(Operating(ratio * at.low_rpm, ratio * at.high_rpm))}
+        | {"speed": str(Operating(ratio * at.low_rpm, ratio * at.high_rpm))}
         | {"kind": kind, "verdict": v.state}
         for at, verdicts in assessed
         for kind, v in verdicts.items()
@@ -153,7 +153,8 @@ def verdict_table(name: str, assessed: Sequence[tuple[Operating, dict[str, Verdi
     close = f"close: an edge within {100 * CLOSE:g} % of the speed or within its own uncertainty"
     columns = ["kind", "verdict", "where"]
     title = f"Operating speeds of {name} beside its zones ({close})"
-    return table(title, rows, ["speed", *([other] if beside else []), *columns, Column("nearest edge", "edge"), *away])
+    speed = Column("speed" if beside is None else f"speed ({beside[0]})", "speed")
+    return table(title, rows, [speed, *columns, Column("nearest edge", "edge"), *away])
 
 
 def calmest(zones: Iterable[Zone], first: float, last: float) -> tuple[float, float] | None:

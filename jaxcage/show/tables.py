@@ -16,7 +16,7 @@ import numpy as np
 SHOWN = {"m": "mm", "rad/s": "rpm", "rad": "deg", "1": ""}
 """Units in which quantities of an SI unit are shown, unless a column says otherwise."""
 Beside = tuple[str, float] | None
-"""Speed that is shown beside the model's: `shaft` or `cage`, and its ratio to the model's."""
+"""Speed that is shown in place of the model's: `shaft` or `cage`, and its ratio to the model's."""
 NOTHING = "-"
 """Cell of a value that is not known."""
 OWN = "each its own"
@@ -125,6 +125,8 @@ class Table:
     """Name under which the records stand in a document; without one they do not."""
     empty: str = "none"
     """Text of the only row where there are no records."""
+    detail: bool = False
+    """True for a table that a command prints on request only."""
 
     @property
     def heads(self) -> list[str]:
@@ -164,9 +166,9 @@ def table(
 def speed_columns(
     head: str, key: str, beside: Beside, error: str = "", digits: int = 0, nothing: str = NOTHING
 ) -> list[Column]:
-    """Columns of a speed [rpm], or a difference of speeds, and of the speed that goes with it."""
-    own = Column(head, key, error=error, digits=None if error else digits, nothing=nothing)
-    return [own] if beside is None else [own, Column(beside[0], key, digits=digits, times=beside[1])]
+    """The column of a speed [rpm], or a difference of speeds, of the model or of what `beside` names."""
+    head, times = (head, 1.0) if beside is None else (f"{head} ({beside[0]})", beside[1])
+    return [Column(head, key, error=error, digits=None if error else digits, nothing=nothing, times=times)]
 
 
 def shares_table(title: str, sort: str, counts: Mapping[str, int]) -> Table:

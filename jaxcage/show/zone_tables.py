@@ -1,5 +1,6 @@
 """Zones found in a sweep or by a search beside the published ones; bifurcations, stable stretches of orbits."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -50,9 +51,9 @@ def zone_span(zone: Zone, lowest: float = -math.inf, highest: float = math.inf) 
     return lowest if low is None else low.speed_rpm, highest if high is None else high.speed_rpm
 
 
-def zone_words(zone: Zone) -> str:
+def zone_words(zone: Zone, beside: Beside = None) -> str:
     """The speeds of a zone in words."""
-    low, high = zone_span(zone)
+    low, high = (speed * (1.0 if beside is None else beside[1]) for speed in zone_span(zone))
     if math.isinf(low):
         return "the whole range" if math.isinf(high) else f"up to {high:.0f} rpm"
     return f"from {low:.0f} rpm on" if math.isinf(high) else f"{low:.0f} to {high:.0f} rpm"
@@ -65,8 +66,8 @@ def motion_tables(
     published: PublishedCase | None = None,
     beside: Beside = None,
 ) -> list[Table]:
-    """Chaotic zones, their edges and mean lives, zones of chaos that dies out, each if there are any; or stretches of
-    speed with the same labels."""
+    """Chaotic zones, and in detail their edges and the zones of chaos that dies out; or stretches of speed with the
+    same labels."""
     if not isinstance(found, Zones):
         rows = [vars(each) | {"motion": " or ".join(each.labels)} for each in found]
         columns = [Column("from", "low_rpm", digits=0), Column("to", "high_rpm", digits=0), "motion"]
@@ -79,8 +80,8 @@ def motion_tables(
     transient = f"Transient chaos of {name}, mean life below {found.horizon} revolutions"
     return [
         _beside_published(title, "zones", found.zones, published, span, beside),
-        *_details(f"Chaotic zones of {name} in detail", found.zones),
-        *_details(transient, found.transient, "transient"),
+        *_details(f"Chaotic zones of {name} in detail", found.zones, beside),
+        *_details(transient, found.transient, beside, "transient"),
     ]
 
 
@@ -105,12 +106,14 @@ def _beside_published(
         outside = span[0] > (range_rpm[1] or math.inf) or (span[1] is not None and span[1] < range_rpm[0])
         partners.setdefault(-1 if outside else _partner(span, zones), []).append(span)
     rows = [
-        {"zone": i + 1, **zone_record(zone), "published": _words(partners.get(i, []))} for i, zone in enumerate(zones)
+        {"zone": i + 1, **zone_record(zone), "life": _life(zone), "published": _words(partners.get(i, []))}
+        for i, zone in enumerate(zones)
     ]
     columns: list[Column | str] = ["zone"]
     for end in ENDS:
         columns += speed_columns(end, f"{end}_rpm", beside, f"{end}_uncertainty_rpm", nothing="past range")
-    columns += speed_columns("width", "width_rpm", None, nothing="open")
+    columns.append(Column("share", shown="%", digits=0))
+    columns += [Column("mean life [revolutions]", "life")] if any(zone.life for zone in zones) else []
     missing = {None: "Published, but not found", -1: "Published beyond this range"}
     notes = [f"{words}: {_words(partners[which])}" for which, words in missing.items() if which in partners]
     return table("\n".join([title, *notes]), rows, [*columns, *([] if published is None else ["published"])], key)
@@ -128,22 +131,24 @@ def _partner(span: Span, zones: Sequence[Zone]) -> int | None:
     return best if best is not None and shared[best] > 0 else None
 
 
-def _details(title: str, zones: Sequence[Zone], key: str = "") -> list[Table]:
+def _life(zone: Zone) -> str | None:
+    """Mean life of chaos in a zone, in revolutions."""
+    return None if zone.life is None else lives_in_words(zone.life, lambda life: f"{life.revolutions:.0f}")
+
+
+def _details(title: str, zones: Sequence[Zone], beside: Beside, key: str = "") -> list[Table]:
     """Mechanisms of the edges, share of chaotic initial states, and mean life of chaos in revolutions and, each at its
     own speed, in seconds; nothing if there are no zones."""
     rows = []
     for i, zone in enumerate(zones, start=1):
-        row = zone_record(zone) | {"zone": f"{i}: {zone_words(zone)}"}
+        row = zone_record(zone) | {"zone": f"{i}: {zone_words(zone, beside)}"}
         if zone.life is not None:
-            turns, seconds = (
-                lives_in_words(zone.life, f) for f in (lambda x: f"{x.revolutions:.0f}", lambda x: f"{x.seconds:.1f}")
-            )
-            row["life"] = f"{turns} ({seconds} s)"
+            row["life"] = f"{_life(zone)} ({lives_in_words(zone.life, lambda life: f'{life.seconds:.1f}')} s)"
         rows.append(row)
     columns = ["zone", *(Column(f"{end} by", f"{end}_mechanism") for end in ENDS)]
     columns.append(Column("share", shown="%", digits=0))
     columns += [Column("mean life [revolutions]", "life")] if any(zone.life for zone in zones) else []
-    return [table(title, rows, columns, key)] if rows else []
+    return [dataclasses.replace(table(title, rows, columns, key), detail=True)] if rows else []
 
 
 AT_LIMIT_RPM = 1e-6
