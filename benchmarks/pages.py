@@ -89,7 +89,6 @@ BLOCKS: dict[str, tuple[str, str, Part]] = {
     "check-template": (README, CHECK, answer),
     "design-1a": (README, CALM, tables("Design of", "Requirements")),
     "against-paper": (README, REPRODUCE, against_paper),
-    "reproduce-figure": (README, REPRODUCE, figure("reproduce_fig7a.png", "reproduce_7a.png")),
     "speed": (README, "python -m benchmarks", speed),
     "guide-zones-1a": (EDGE, "jaxcage zones 1a", tables("Unstable ranges", "Elasticities", "Chaotic zones of")),
     "bifurcations-1a-figure": (EDGE, "jaxcage bifurcations 1a", figure("bifurcations_1a.png")),
