@@ -31,8 +31,8 @@ import jaxcage as jc
 from benchmarks.common import columns
 from jaxcage.design import SEARCHES, DesignSpace, OperatingRange, Requirements, SurrogateSearch, cost_function
 from jaxcage.design.operating import KEPT
+from jaxcage.design.optimiser import Problem
 from jaxcage.design.requirements import listed
-from jaxcage.design.search import Problem
 from jaxcage.files import read_bearing
 from jaxcage.lanes import sobol
 

@@ -14,7 +14,7 @@ from report_example import RATIO, sections, swept
 import jaxcage as jc
 from jaxcage.analysis import Edge, Zone, Zones
 from jaxcage.show import Operating, calmest, page, read_operating
-from jaxcage.show.operating import chaotic_verdict, unstable_verdict
+from jaxcage.show.operating_speeds import chaotic_verdict, unstable_verdict
 
 
 PER_RPM = np.pi / 30

@@ -5,7 +5,7 @@
 | `design_space`  | a design with the parameters that may change and their bounds                      |
 | `requirements`  | limits that a design must keep, what it costs, tolerances of manufacture           |
 | `operating`     | edges and orbits of an operating range, with exact derivatives by the design       |
-| `search`        | the cheapest design that keeps its requirements over an operating range            |
+| `optimiser`     | the cheapest design that keeps its requirements over an operating range            |
 | `check`         | simulations of a design from many initial states                                   |
 | `statistics`    | chaotic speeds, quantities, loads of designs, read off one sweep; designs compared |
 | `loads`         | loads of the guiding land, size and whirl of the motion                            |
@@ -22,6 +22,7 @@ from .check import Checked as Checked, check_design as check_design
 from .design_space import DesignSpace as DesignSpace, Value as Value
 from .loads import LAND_LOADS as LAND_LOADS, land_loads as land_loads, motions as motions
 from .operating import OperatingRange as OperatingRange, UnstableWidth as UnstableWidth
+from .optimiser import SEARCHES as SEARCHES, Design as Design, Trial as Trial, design_for as design_for
 from .requirements import (
     COSTS as COSTS,
     Budget as Budget,
@@ -31,7 +32,6 @@ from .requirements import (
     Tolerance as Tolerance,
     cost_function as cost_function,
 )
-from .search import SEARCHES as SEARCHES, Design as Design, Trial as Trial, design_for as design_for
 from .slopes import (
     DIRECTIONS as DIRECTIONS,
     MeanGradient as MeanGradient,

@@ -6,7 +6,7 @@
 | `newton`          | Newton's method for orbits, damped; derivatives by the implicit function theorem    |
 | `orbit`           | periodic orbits, their multipliers, and the determinant these must have             |
 | `point`           | bifurcation points: kinds, and matrices and functions that vanish there             |
-| `step_control`    | step control of continuation: predictions, accepted and refused steps               |
+| `arclength`       | step control of continuation: predictions, accepted and refused steps               |
 | `continuation`    | pseudo-arclength continuation, an iterator with corrector, step control and events  |
 | `location`        | bifurcations between orbits of a branch, compared with every change of stability    |
 | `branch`          | branches of orbits with their bifurcations; period-doubling cascades                |
@@ -18,6 +18,7 @@
 """
 
 from .._arguments import check_layer
+from .arclength import StepControl as StepControl
 from .bifurcation import bifurcation as bifurcation
 from .branch import (
     Branch as Branch,
@@ -53,7 +54,6 @@ from .search import (
     stable_range as stable_range,
     synchronous_orbits as synchronous_orbits,
 )
-from .step_control import StepControl as StepControl
 from .unstable import (
     Explained as Explained,
     UnstableRanges as UnstableRanges,

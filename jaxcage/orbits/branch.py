@@ -16,6 +16,7 @@ from ..analysis import Edge
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import AbstractMethod, Rodas4
+from .arclength import Points, StepControl
 from .continuation import (
     ONCE,
     Continuation,
@@ -31,7 +32,6 @@ from .location import Place, bifurcations_of
 from .orbit import NearOrbit, Orbit
 from .point import CRITICAL, UNEXPLAINED, Outcome, Point, read_start, require_found, test_functions
 from .problem import SETTLED, SPEED, Given, Parameter, name_of
-from .step_control import Points, StepControl
 
 
 FEIGENBAUM = 4.669201609102990

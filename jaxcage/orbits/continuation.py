@@ -21,11 +21,11 @@ from jaxtyping import Array, Float
 from .._errors import ArgumentError
 from .._pytrees import compiled
 from ..solve import AbstractMethod, cores
+from .arclength import Points, StepControl
 from .newton import TOLERANCE, AbstractEquations, solve
 from .orbit import OrbitEquations
 from .point import eigenvalues
 from .problem import GIVEN_UP, SETTLED, SPEED, Counts, Given, Parameter, by_rodas4, by_steps, counted, make_problem
-from .step_control import Points, StepControl
 
 
 CHUNK = 8  # points per call: up to eight cost what one does, since they share the processor's instructions

@@ -13,10 +13,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from .arclength import Points
 from .continuation import ContinuationProblem, correct, solved_again
 from .point import COMPLEX, UNEXPLAINED, critical_of, test_functions, to_critical
 from .problem import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
-from .step_control import Points
 
 
 WIDER = (0, 1, 3)  # a bifurcation that is not where it was seen is looked for this many orbits further out

@@ -16,7 +16,7 @@
 | `parameter_tables` | parameters with their sources, two designs compared                   |
 | `design_tables`    | designs before and after a search, shares of variance, tolerances     |
 | `chance_tables`    | chances of chaos, ranges that measurements narrowed                   |
-| `operating`        | operating speeds and their place among the zones                      |
+| `operating_speeds` | operating speeds and their place among the zones                      |
 | `report`           | answers of commands as one page of HTML                               |
 """
 
@@ -70,7 +70,7 @@ from .maps import (
     stability_map as stability_map,
     top_exponent as top_exponent,
 )
-from .operating import (
+from .operating_speeds import (
     Operating as Operating,
     assess as assess,
     calmest as calmest,

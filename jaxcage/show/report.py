@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from .. import __version__
 from .diagrams import CAGE, SHAFT, add_shaft_axes, mark_operating
-from .operating import Operating
+from .operating_speeds import Operating
 from .tables import Table, table
 
 
