@@ -16,6 +16,7 @@
 | `parameter_tables` | parameters with their sources, two designs compared                   |
 | `design_tables`    | designs before and after a search, shares of variance, tolerances     |
 | `chance_tables`    | chances of chaos, ranges that measurements narrowed                   |
+| `verdict_tables`   | the verdict for an operating range, its margins, what to change first |
 | `operating_speeds` | operating speeds and their place among the zones                      |
 | `report`           | answers of commands as one page of HTML                               |
 """
