@@ -44,7 +44,8 @@ def hazard(
     """Fit the law to escape times in whole blocks by maximum likelihood.
 
     **Arguments:** escape time of each lane [revolutions], infinity for never, NaN for failed; time to which lanes were
-    followed; covariates of each lane, of order one; resolution of the escape times and time left out [revolutions]. Lanes that are calm at t0 or failed do not count.
+    followed; covariates of each lane, of order one; resolution of the escape times, and time left out [revolutions].
+    Lanes that are calm at t0 or failed do not count.
 
     **Raises:** `ValueError` with fewer than ten escapes, or fewer than ten blocks survived.
     """

@@ -39,8 +39,7 @@ def motion_size(
 def closing_tolerance(
     strobe: Float[np.ndarray, "*lanes keep dim"], scale: Float[np.ndarray, "*#lanes dim"]
 ) -> Float[np.ndarray, "*lanes"]:
-    """Distance within which a strobe orbit must return, in units of the scale: 1e-4 of the size of the motion, which is
-    limited to 1e-6 to 1."""
+    """Distance within which a strobe orbit must return [scale]: 1e-4 of the size of its motion, within 1e-6 to 1."""
     return np.asarray(CLOSING_TOLERANCE * np.clip(motion_size(strobe, scale), SMALLEST_MOTION, 1.0))
 
 

@@ -19,8 +19,7 @@ class Peak(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class OrderSpectrum:
-    """Amplitude spectrum over orders, with a Hann window: a sine of amplitude a appears as a, or as 0.85 a if it lies
-    halfway between two bins."""
+    """Amplitude spectrum over orders, with a Hann window: a sine is up to 15 % too small if it is between two bins."""
 
     order: Float[np.ndarray, " orders"]
     """Multiples of the cage speed, ascending."""

@@ -167,11 +167,8 @@ class Survival:
 
     @property
     def standard_error(self) -> float:
-        """Standard error of the mean life [revolutions], NaN if unknown.
-
-        From the Fisher information of the counts of blocks, the relative error is sinh(x/2)/(x/2) / sqrt(n), with x the
-        block in units of the mean life.
-        """
+        """Standard error of the mean life [revolutions], NaN if unknown: from the Fisher information of the counts of
+        blocks, relative sinh(x/2)/(x/2) / sqrt(n), with x the block in units of the mean life."""
         if not self.escapes or not self.survived:
             return math.nan
         half = self.block * self.rate / 2

@@ -137,8 +137,7 @@ def runs(mask: Bool[np.ndarray, " speeds"]) -> list[tuple[int, int]]:
 def close_windows(
     rpm: np.ndarray, chaotic: Bool[np.ndarray, " speeds"], close_below_rpm: float
 ) -> list[tuple[int, int]]:
-    """Runs of chaotic speeds, joined if the window between them, measured from chaotic speed to chaotic speed, is
-    narrower than `close_below_rpm`."""
+    """Runs of chaotic speeds, joined if the distance from the last to the next is less than `close_below_rpm`."""
     joined: list[tuple[int, int]] = []
     for first, last in runs(chaotic):
         if joined and rpm[first] - rpm[joined[-1][1]] < close_below_rpm * (1 - 1e-9):  # rounding of the grid
@@ -232,8 +231,7 @@ def zones(sweep: xr.Dataset, close_below_rpm: float | None = None) -> Zones:
 
 
 def _undecided(found: xr.Dataset, chaotic: Bool[np.ndarray, " speeds"]) -> Bool[np.ndarray, " speeds"]:
-    """True for speeds with a mean life of chaos that may be on either side of the horizon, and for speeds without chaos
-    but with an undecided lane that may be chaotic within two standard errors."""
+    """True for speeds at which the mean life may be on either side of the horizon, or an undecided lane chaotic."""
     highest = (found["exponents"] + 2 * found["standard_error"]).values
     open_ = (found["label"].values == "undecided") & (highest > CHAOS_THRESHOLD)[..., 0]
     undecided = ~chaotic & np.any(open_, axis=1)
@@ -266,8 +264,7 @@ class Stretch:
 
 
 def stretches(sweep: xr.Dataset) -> tuple[Stretch, ...]:
-    """Ascending stretches of speed with the same labels and the same sign of the exponent; their ends have an
-    uncertainty of half the spacing of the speeds."""
+    """Ascending stretches of speed with equal labels and sign of the exponent, accurate to half the spacing."""
     rpm, label = sweep["rpm"].values, sweep["label"].values
     kinds = [_kind(sweep, label, i) for i in range(rpm.size)]
     ends = [0, *(i for i in range(1, len(kinds)) if kinds[i] != kinds[i - 1]), len(kinds)]

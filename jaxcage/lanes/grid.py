@@ -48,8 +48,8 @@ SIGMAS = 3.0
 
 @dataclasses.dataclass(frozen=True)
 class Between:
-    """Distribution of a parameter between two bounds: uniform or, if `normal`, a normal distribution truncated at the
-    bounds, which are `SIGMAS` standard deviations from the middle, as for a tolerance."""
+    """Distribution of a parameter between two bounds: uniform or, if `normal`, truncated normal with the bounds at
+    `SIGMAS` standard deviations, as for a tolerance."""
 
     lower: float
     """Lower bound [SI]."""

@@ -85,8 +85,7 @@ def follow(
 
 
 def _aligned(late: Float[np.ndarray, "lanes ran"], count: int) -> Float[np.ndarray, "lanes parts"]:
-    """Growth in `count` equal parts of the run without the first block of each stage, in which tangent vectors still
-    align; empty if there are too few blocks."""
+    """Growth in `count` equal parts, without the first block of each stage, in which tangent vectors still align."""
     blocks = late[:, np.arange(late.shape[1]) % STAGE > 0]
     size = blocks.shape[1] // count
     if size == 0:

@@ -88,8 +88,7 @@ class Plan:
 
     @classmethod
     def one_speed_each(cls, designs: Sequence[AbstractForcedSystem], speeds: Float[np.ndarray, " designs"]) -> "Plan":
-        """Plan of designs, each at its own speed [rad/s] and from all of its initial states: axes `design` and
-        `initial_state`."""
+        """Plan of designs, each at its own speed [rad/s], from all their initial states (axes as in `over_speed`)."""
         models = _models(designs)
         begin = np.stack([states_at(m, s, None)[0] for m, s in zip(models, speeds[:, None], strict=True)])
         count, initial_states, _ = begin.shape

@@ -26,8 +26,8 @@ WAYS = ("up", "down")
 
 
 def ramp_revolutions(model: AbstractForcedSystem, first: float, last: float, seconds: float) -> int:
-    """Number of revolutions of a ramp from `first` to `last` [rad/s] in `seconds`: the speed changes by equal amounts
-    per revolution, so that its mean over time is the logarithmic mean."""
+    """Number of revolutions of a ramp from `first` to `last` [rad/s] in `seconds`, by the logarithmic mean speed, since
+    the speed changes by equal amounts per revolution."""
     low, high = (abs(float(model.turning_speed(speed))) for speed in (first, last))
     return math.ceil(seconds * (high - low) / (2 * math.pi * math.log(high / low)))
 
@@ -79,11 +79,8 @@ def ramp_up_down(
 
 
 def apart(found: xr.Dataset) -> Bool[np.ndarray, " windows"]:
-    """True for windows in which the size of the motion differs between up and down (hysteresis).
-
-    The difference must exceed three times the scatter of the windows around, since chaos alone is not hysteresis, and
-    5 % of the larger orbit, in at least two neighbouring windows.
-    """
+    """True for windows with hysteresis: sizes up and down that differ by three times the scatter of the windows around
+    (chaos alone is not hysteresis) and 5 % of the larger orbit, in at least two neighbouring windows."""
     a, b = found["size"].values
     scatter = np.hypot(*(_around(x) for x in found["scatter"].values))
     beyond = np.abs(a - b) > np.maximum(SURE * scatter, WORTH * np.maximum(a, b))

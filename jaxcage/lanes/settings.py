@@ -12,10 +12,7 @@ from ..solve import AbstractMethod, native
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """Settings of a run, common to all lanes of a plan: length, accuracy, and what is computed.
-
-    The defaults suit a forced system; a model may have its own (`run_defaults`).
-    """
+    """Settings of a run, common to all lanes of a plan; a model may have its own defaults (`run_defaults`)."""
 
     discard: int = 300
     """Revolutions discarded at the beginning."""

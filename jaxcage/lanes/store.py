@@ -121,8 +121,7 @@ def open_study(path: str | Path) -> xr.Dataset:
 
 
 def _is_finished(path: Path, arrays: Mapping[str, Any], chunk: int) -> bool:
-    """True if all files of a chunk exist and agree with their checksums; the axes of all variables begin with those of
-    `outcome`."""
+    """True if all files of a chunk exist and agree with their checksums."""
     counts = arrays[OUTCOME].cdata_shape
     place = tuple(map(int, np.unravel_index(chunk, counts)))
     for name in sorted(arrays, key=lambda name: name != OUTCOME):

@@ -65,7 +65,7 @@ class Singular(NamedTuple):
 
 
 class PointEquations(AbstractEquations):
-    """The orbit's equations and g = 0, the scalar that vanishes where a matrix is singular (see `bordered`).
+    """The orbit's equations and g = 0, a scalar that vanishes where a matrix is singular (see `bordered`).
 
     `critical` is the critical multiplier, -1 or 1, or None for a complex pair.
     """
@@ -174,10 +174,8 @@ def _along_branch(
     reach: float,
     method: AbstractMethod | None,
 ) -> tuple[Point | None, str]:
-    """Return the nearest bifurcation of `kind` on the branch through an orbit, or None, and the range searched.
-
-    Continuation succeeds near a superstable orbit, where Newton's method for the point fails: its scalar is flat there.
-    """
+    """Return the nearest bifurcation of `kind` on the branch through an orbit, or None, and the range searched; this
+    succeeds near superstable orbits, where the scalar of Newton's method is flat."""
     at = float(begin.at)
     away = float(reach) * (abs(at) or 1.0)
     problem = orbit_curves(given, parameter, at - away, at + away, method, periods)

@@ -41,11 +41,8 @@ AMPLITUDE, SMALLEST_AMPLITUDE = 0.02, 1e-5
 
 @dataclasses.dataclass(frozen=True)
 class Branch:
-    """Orbits in order along a branch, and its bifurcations.
-
-    Values of the parameter and states at phase 0 are in SI units, speeds in rad/s; `steps` is the number per
-    revolution, and `error` that of `Orbit`.
-    """
+    """Orbits in order along a branch, and its bifurcations: values of the parameter and states at phase 0 [SI], speeds
+    [rad/s], `steps` per revolution, and `error` as in `Orbit`."""
 
     parameter: str
     value: Float[np.ndarray, " points"]
@@ -304,10 +301,8 @@ def cascade(
 
 
 def _doubled(problem: ContinuationProblem, point: Point, amplitude: float) -> Branch | None:
-    """Follow the branch of doubled period from a period doubling to its own first one; None if no branch is found.
-
-    The first orbit is sought at `amplitude` along the critical direction, in units of the system's scale.
-    """
+    """Follow the doubled branch from `amplitude` (in units of the scale) along the critical direction to its own first
+    period doubling; None if no branch is found."""
     at, periods = float(point.value), int(point.periods)
     problem, half = problem.around(at, 2 * periods), problem.around(at, periods)
     test = lambda points: test_functions(problem.multipliers(points))["period-doubling"]

@@ -225,10 +225,8 @@ def first_points(
     steps: int = 0,
     likely: np.ndarray | None = None,
 ) -> Points:
-    """Find points of curves on planes across them, each with as many steps as it needs, at least `steps`.
-
-    If the first number of steps finds nothing, more are tried only for points that are `likely`, by default all.
-    """
+    """Find points of curves on planes across them, each with as many steps as it needs, at least `steps`; if the first
+    number of steps finds nothing, more are tried only for points that are `likely`, by default all."""
     counts = problem.counts
     first = int(counts.first if counts.chooses else counts.last)
     likely = np.ones(len(at), dtype=bool) if likely is None else likely
@@ -259,11 +257,8 @@ def solved_again(
 
 @dataclasses.dataclass
 class Path:
-    """State of one curve during continuation: its points and the length of its next step.
-
-    `steps` is the number per revolution; `ended` is the reason why it ended (see `Branch.ended`), empty while it has
-    not; if `crosses`, the next point may be beyond a crossing.
-    """
+    """State of a curve during continuation: points, length of the next step, `steps` per revolution, number, and reason
+    why it `ended` (see `Branch.ended`), empty if it has not; if `crosses`, the next point may be beyond a crossing."""
 
     points: list[Points]
     length: float

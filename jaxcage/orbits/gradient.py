@@ -198,8 +198,7 @@ def _combined(name: str, kind: str, parts: Sequence[tuple[float, Sensitivity]]) 
 
 
 class OrbitSlopes(NamedTuple):
-    """Modulus of an orbit's largest multiplier, with its derivatives and those of the state at phase 0 [SI] by n design
-    variables."""
+    """Modulus of an orbit's largest multiplier, and derivatives of it and of the state [SI] by n design variables."""
 
     multiplier: float
     multiplier_slope: Float[np.ndarray, " n"]

@@ -50,8 +50,7 @@ class Place:
     within: float = LOCATED
 
     def ends(self, beyond: int | None) -> Points | None:
-        """Return points on both sides: orbits, `beyond` ones further out, or points close to the last location if
-        `beyond` is None; None without a location."""
+        """Return points on both sides: orbits, `beyond` ones further out, or (None) points about the last location."""
         if beyond is not None:
             return self.row.take([max(self.after - beyond, 0), min(self.after + 1 + beyond, len(self.row.u) - 1)])
         if self.point is None:
@@ -194,8 +193,7 @@ def _dips(problem: ContinuationProblem, row: Points) -> list[tuple[int, int]]:
 
 
 def _sinking(f: Float[np.ndarray, "functions points"], length: Float[np.ndarray, " steps"]) -> list[tuple[int, int]]:
-    """Return steps with one sign of a function at both ends where a parabola through three points (nearly) reaches the
-    other sign in between."""
+    """Return steps in which a parabola through three points suggests that a function may change its sign twice."""
     back, ahead = length[:-1], length[1:]
     chord = np.diff(f) / length
     bend = np.diff(chord) / (back + ahead)
@@ -232,11 +230,8 @@ def _located(problem: ContinuationProblem, rows: Sequence[Points]) -> list[list[
 
 
 def _locate(problem: ContinuationProblem, places: Sequence[Place]) -> None:
-    """Set point, steps and error of each place, doubling the steps until it moves by less than the tolerance.
-
-    A branch point, where the curve's equations are singular, may be found with some numbers of steps and not with
-    others; its error is computed from those that find it.
-    """
+    """Set point, steps and error of each place, doubling the steps until it moves by less than the tolerance; the error
+    of a branch point, where the curve's equations are singular, is computed from the steps that find it."""
     counts, chooses = problem.counts, problem.counts.chooses
     most = MOST_OF_A_POINT if chooses else int(counts.last)
     for p in places:

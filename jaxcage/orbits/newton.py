@@ -74,11 +74,8 @@ class Newton(NamedTuple):
 
 
 class Found(eqx.Module):
-    """Result of Newton's method apart from the root, without derivatives.
-
-    `error` is the distance to the root with half the steps per revolution (see `AbstractEquations.apart`), infinite if
-    none was found, and NaN if it was not computed.
-    """
+    """Result of Newton's method apart from the root, without derivatives; `error` is the distance to the root with half
+    the steps (see `AbstractEquations.apart`), infinite if none was found, NaN if it was not computed."""
 
     converged: Bool[Array, ""]
     newton: Newton
@@ -192,10 +189,8 @@ def as_root(given: Any, *, equations: AbstractEquations, u: Float[Array, " n"]) 
 
 
 def numbers_of(strobe: StrobeMap) -> tuple[Float[Array, " k"], Callable[[Array], StrobeMap]]:
-    """Return the numbers of a map's field in a row, and the function that puts such a row into the map.
-
-    The system and its scale are left out: they only affect the measurement of excursions and errors.
-    """
+    """Return the numbers of a map's field in a row, and the function that puts such a row into the map; the system and
+    its scale, which only serve to measure excursions and errors, are left out."""
     numbers, rest = eqx.partition(strobe.field, eqx.is_inexact_array)
     k, unravel = ravel_pytree(numbers)
     return k, lambda row: dataclasses.replace(strobe, field=eqx.combine(unravel(row), rest))
@@ -223,10 +218,8 @@ class Slopes(eqx.Module):
 
 
 def by_columns(x: Float[Array, " n"], f: Callable[[Array], Any]) -> Any:
-    """Return f(x); also in reverse mode its derivatives, of any order, come from Jacobians in forward mode.
-
-    `f` is a module; its own numbers have no derivative.
-    """
+    """Return f(x); even in reverse mode its derivatives, of any order, come from Jacobians in forward mode. `f` is a
+    module, whose own numbers have no derivative."""
     numbers, rest = eqx.partition(f, eqx.is_array)
 
     @jax.custom_jvp

@@ -159,11 +159,8 @@ def make_problem(
 
 
 def other_steps(steps: Any) -> Any:
-    """Return a number of steps whose ends are at other phases than those of `steps`.
-
-    If a kink of the law is met near an end that 256, 512, 1024, ... steps share, doubling the steps does not reveal
-    their common error.
-    """
+    """Return a number of steps whose ends are at other phases: doubling 256 steps again and again does not reveal the
+    error from a kink of the law near an end that all these numbers share."""
     return (3 * steps // 4) | 1
 
 
@@ -230,10 +227,8 @@ def with_fallback(
     serves: Callable[[Any], Any],
     most: int = MOST,
 ) -> Any:
-    """Return the result of `find` with a method or, without one, with Runge-Kutta and, if that fails, with Rodas4.
-
-    The solver is chosen before compilation; under `jit` and `vmap` it is always Runge-Kutta.
-    """
+    """Return the result of `find` with a method or, without one, with Runge-Kutta and, if that fails, with Rodas4 (but
+    never under `jit` and `vmap`, since the solver is chosen before compilation)."""
     found = find(*counted(method, most))
     if method is not None or isinstance(good := serves(found), Tracer) or bool(good):
         return found

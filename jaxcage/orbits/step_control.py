@@ -73,9 +73,8 @@ class Points(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """Comparison of a new point with its prediction and the last point: distance from the prediction; angle between the
-    tangents over the largest allowed; `sure`, True if it is on the curve or on one that crosses it; `same`, True if the
-    determinant of the equations with the tangent keeps its sign."""
+    """Comparison of a new point: distance from its prediction; angle between its tangent and the last, over the largest
+    allowed; `sure`, True if it is on the curve or one that crosses it; `same`, True if the orientation is the same."""
 
     missed: float
     turned: float

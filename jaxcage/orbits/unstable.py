@@ -174,10 +174,8 @@ def explain(
 def _source(
     points: list[Point], rpm: float, near: float, calm: int, system: AbstractForcedSystem, method: AbstractMethod | None
 ) -> Point | Cascade | None:
-    """Return the point within `near` of an edge at `rpm`, or the cascade whose limit is.
-
-    `calm` is 1 if the stable side is above the edge, and -1 if it is below.
-    """
+    """Return the point within `near` of an edge at `rpm`, or the cascade whose limit is; `calm` is 1 if the stable side
+    is above the edge, -1 if below."""
     away = lambda p: abs(p.speed_rpm - rpm)
     here = [p for p in points if away(p) <= near + np.nan_to_num(p.error_rpm)]
     if here:
