@@ -49,8 +49,8 @@ def closing_period(
     """Smallest k <= 8 for which every kept strobe state returns after k revolutions; 0 where there is none.
 
     A lane that spirals towards an orbit of period j may return to within the tolerance after k > j revolutions, if k is
-    nearly a full turn of the spiral, before it does after j. It is told from an orbit of period k by its distance after
-    j revolutions, which decays together with that after k: such lanes have the period j.
+    nearly a full turn of the spiral, before it does after j. Unlike on an orbit of period k, its distance after j
+    revolutions decays together with that after k: such lanes have the period j.
 
     Coordinates and velocities are compared in units of `scale`, to within `closing_tolerance`.
     """

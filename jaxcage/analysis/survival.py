@@ -2,7 +2,8 @@
 
 Lanes leave a chaotic set that is not an attractor one by one, after a short time t0 at a rate that no longer depends on
 their initial states: of N lanes N exp(-t/tau) remain after t. The escapes yield an estimate of tau; without escapes
-only a lower bound of tau is known. No finite run proves an attractor.
+only a lower bound of tau is known. No finite run proves an attractor. Lanes that are periodic or quasi-periodic, or
+approach such a motion, are called calm.
 
 Y.-C. Lai and T. Tel, Transient Chaos (Springer 2011); E. G. Altmann, J. S. E. Portela and T. Tel, Leaking chaotic
 systems, Rev. Mod. Phys. 85 (2013) 869-918.

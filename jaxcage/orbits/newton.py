@@ -152,7 +152,7 @@ def refined(
 
     def doubling(carry: tuple) -> tuple:
         i, u, before, done = carry
-        steps = counts.steps(i)  # common to all lanes under `vmap`: otherwise each lane would wait for the largest
+        steps = counts.steps(i)  # common to all lanes under `vmap`: otherwise each would run the largest number
         v, found = once(steps, jnp.where(before.converged, u, guess), done)
         both = before.converged & found.converged
         error, ratio = equations.apart(v - u, before.newton.jacobian, found.newton.jacobian)

@@ -297,7 +297,7 @@ def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Guess | None
     wanted = f"must be a state of {system.dimension} numbers"
     try:
         state = given.state if isinstance(given, Orbit) else jnp.stack([jnp.asarray(c, dtype=float) for c in given])
-    except (TypeError, ValueError) as error:  # of another kind, or ragged
+    except (TypeError, ValueError) as error:  # not numbers, or of unequal shapes
         raise ArgumentError("guess", said=f"{wanted}, but {shown(guess)} was given.") from error
     if state.shape != (system.dimension,):
         raise ArgumentError("guess", said=f"{wanted}, but has shape {state.shape}.")

@@ -71,7 +71,7 @@ def is_traced(tree: Any) -> bool:
 
 
 class Given(eqx.Module):
-    """The system and the speed: derivatives are taken with respect to these."""
+    """System and speed, with respect to which derivatives are taken."""
 
     system: AbstractForcedSystem
     speed: Scalar

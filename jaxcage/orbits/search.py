@@ -282,7 +282,7 @@ def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
 
 
 def _stable_parts(branch: Branch, number: int, limits: tuple[float, float]) -> list[StableRange]:
-    """Return the stable parts of a branch over speed, cut to the limits [rpm]."""
+    """Return the stable parts of a branch over speed, within the limits [rpm]."""
     found = []
     edges = {p.index: p for p in branch.special if p.edge and p.status == "converged"}
     bounds = [-1, *np.flatnonzero(np.diff(branch.stable.astype(int))).tolist(), branch.value.size - 1]

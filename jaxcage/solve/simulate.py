@@ -203,7 +203,7 @@ def simulate(
     require_x64()
     require_known("simulate", INSTEAD, system, speed, start)
     options: dict[str, Any] = dict(revolutions=revolutions, samples=samples, discard=discard)
-    return ramp(system, speed, speed, **options, start=start, method=method)  # one that does not rise
+    return ramp(system, speed, speed, **options, start=start, method=method)  # a ramp with equal ends
 
 
 def ramp(
@@ -243,7 +243,7 @@ def ramp(
     rises = np.where(numbers < 0, 0.0, rise)
     first_of = low + rise * np.maximum(numbers, 0)
     comparable = min(system.comparable(low), system.comparable(high))
-    parts = min(max(1, math.ceil(REVOLUTION / samples / comparable - 1e-9)), MOST_PARTS)  # from sample to sample
+    parts = min(max(1, math.ceil(REVOLUTION / samples / comparable - 1e-9)), MOST_PARTS)  # between two samples
     places = samples * parts
     speeds = (first_of[:, None] + rises[:, None] * ((np.arange(places) + 0.5) / places)).ravel()
     stretch = max(1, round(comparable * places / REVOLUTION))
