@@ -1,11 +1,11 @@
-"""Analysis: labels of lanes, zones of a sweep, survival of chaos, spectra, measures of a motion.
+"""Labels of trajectories, zones of a sweep, survival of chaos, spectra, and measures of a motion.
 
 | module        | responsibility                                                                       |
 |---------------|--------------------------------------------------------------------------------------|
 | `labels`      | periodic, chaotic, quasi-periodic, undecided or failed; the motion of a cage's centre |
 | `survival`    | times at which lanes left chaos for good; its mean life, with an error               |
-| `hazard`      | the rate of escapes as it depends on speed and design                                |
-| `sweep`       | what the data set of a sweep says of its speeds                                      |
+| `hazard`      | the escape rate as a function of speed and design                                    |
+| `sweep`       | results of a sweep at each speed                                                     |
 | `zones`       | zones and both kinds of edge; stretches of speed with the same labels                |
 | `spectra`     | amplitude spectra by order of speed                                                  |
 | `rollers`     | rollers of a whole bearing around its circumference; spectra with named lines        |

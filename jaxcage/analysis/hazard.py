@@ -1,9 +1,9 @@
-"""How the rate at which lanes leave chaos depends on speed and design: a regression on escape times.
+"""Regression of the rate at which lanes leave chaos on speed and design, from their escape times.
 
-Chaos that is left at a constant rate kappa survives a block of b revolutions with the probability exp(-kappa b). With
-log kappa linear in what differs from lane to lane, each block that a lane is watched is one Bernoulli trial, with a
-complementary log-log link (P. McCullagh and J. A. Nelder, Generalized Linear Models, 2nd ed. 1989, chapter 4); lanes
-that are chaotic to the end are censored.
+At a constant escape rate kappa, chaos survives a block of b revolutions with probability exp(-kappa b). With log kappa
+linear in the covariates, each observed block of a lane is a Bernoulli trial with a complementary log-log link
+(P. McCullagh and J. A. Nelder, Generalized Linear Models, 2nd ed. 1989, chapter 4); lanes that are chaotic to the end
+are censored.
 """
 
 from typing import NamedTuple
@@ -15,23 +15,22 @@ from .._errors import ArgumentError
 
 
 FEWEST_ESCAPES = 10
-"""Fewer tell no slope."""
+"""Smallest number of escapes, and of blocks survived, for which slopes are estimated."""
 BINS = 8
-"""Parts of the lanes, along what is first in `x`, in which escapes seen and expected are compared."""
+"""Groups of lanes, by their first covariate, in which observed and expected escapes are compared."""
 
 
 class Hazard(NamedTuple):
-    """log kappa = intercept + slope . x, kappa in escapes per revolution."""
+    """Fitted law log kappa = intercept + slope . x, with kappa in escapes per revolution."""
 
     coefficients: Float[np.ndarray, " 1+n"]
     """Intercept, then the slopes."""
     covariance: Float[np.ndarray, "1+n 1+n"]
-    """Of the coefficients, from the scatter of the lanes (P. J. Huber 1967): right to first order where the law is not
-    quite so."""
+    """Covariance of the coefficients from the scatter of the lanes (P. J. Huber 1967), robust to a misspecified law."""
     escapes: int
     lanes: int
     p_value: float
-    """Probability of escapes at least as unlike the fitted ones, in parts of the lanes along what is first in `x`."""
+    """Probability of a misfit at least as large as observed, in groups of lanes by the first covariate."""
 
 
 def hazard(
@@ -42,13 +41,13 @@ def hazard(
     block: float | int,
     t0: float | int = 0,
 ) -> Hazard:
-    """Maximum likelihood of the law, from escape times in whole blocks.
+    """Fit the law to escape times in whole blocks by maximum likelihood.
 
     **Arguments:** escape time of each lane [revolutions], infinity for never, NaN for failed; time to which lanes were
-    followed; what differs from lane to lane, of order one; revolutions within which an escape is known; time left out.
+    followed; covariates of each lane, of order one; resolution of the escape times, and time left out [revolutions].
     Lanes that are calm at t0 or failed do not count.
 
-    **Raises:** `ValueError` with fewer than ten escapes, or with fewer than ten blocks survived beside them.
+    **Raises:** `ValueError` with fewer than ten escapes, or fewer than ten blocks survived.
     """
     at_risk = times > t0  # false for NaN
     late, x = times[at_risk], np.asarray(x, dtype=float)[at_risk]
@@ -83,8 +82,7 @@ def hazard(
 def _costs_of_lanes(
     log_rate: np.ndarray, survived: np.ndarray, escaped: np.ndarray, block: float | int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Minus the logarithm of what each lane did, so many blocks survived and then an escape or the end, with its first
-    and second derivatives by log kappa."""
+    """Negative log-likelihood of each lane, and its first and second derivatives by log kappa."""
     rate = block * np.exp(np.clip(log_rate, -500.0, 60.0))
     gone = -np.expm1(-rate)
     left = rate * np.exp(-rate) / gone
@@ -95,8 +93,7 @@ def _costs_of_lanes(
 def _probability_of_fit(
     log_rate: np.ndarray, survived: np.ndarray, escaped: np.ndarray, block: float | int, along: np.ndarray
 ) -> float:
-    """That escapes seen are at least as unlike those expected, in parts of the lanes along some number, with about as
-    many escapes expected in each."""
+    """P-value of a chi-squared test of the escapes in groups of lanes by `along`, with equal expected numbers."""
     expected = -np.expm1(-block * np.exp(log_rate)) * (survived + escaped)
     order = np.argsort(along)
     part = np.minimum((np.cumsum(expected[order]) / np.sum(expected) * BINS).astype(int), BINS - 1)

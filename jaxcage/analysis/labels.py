@@ -3,8 +3,8 @@
 The rule, in this order: `inaccurate` and `failed` by the outcome; `periodic-k` if the strobe orbit closes after k
 revolutions; `chaotic` if the largest exponent is above 0.02 by two standard errors; `quasi-periodic` if it is zero
 within 0.005, two standard errors are below 0.005, and the strobe orbit neither shrinks nor grows; else `undecided`. A
-lane that closes while its neighbours part is undecided: its motion is too small for the scale, or it sits on an
-unstable orbit.
+lane that closes although neighbouring trajectories diverge is undecided: its motion is too small for the scale, or it
+is on an unstable orbit.
 """
 
 import numpy as np
@@ -14,19 +14,19 @@ from ..solve import OUTCOMES
 
 
 CLOSING_TOLERANCE = 1e-4
-"""A strobe orbit counts as closed if it returns to within this fraction of the size of its motion."""
+"""Distance, as a fraction of the size of the motion, within which a strobe orbit must return to count as closed."""
 SMALLEST_MOTION = 1e-6
-"""Motion below this fraction of the system's scale closes by the tolerance of motion of this size: what is smaller is
-not told from a fixed point."""
+"""Size of motion, as a fraction of the system's scale, below which motion is not distinguished from a fixed point."""
 LONGEST_PERIOD = 8
 CHAOS_THRESHOLD = 0.02
-"""Exponent per revolution that must be exceeded by two standard errors."""
+"""Exponent per revolution that chaos must exceed by two standard errors."""
 TORUS_THRESHOLD = 0.005
-"""Largest exponent per revolution, and largest two standard errors of it, that count as zero."""
+"""Largest modulus of an exponent per revolution, and of two standard errors of it, that count as zero."""
 FEWEST_REVOLUTIONS = 20
-"""With fewer, one error bar in forty is three times too small (256 lanes of Ueda's oscillator)."""
+"""Smallest number of revolutions for a usable standard error of an exponent: with fewer, one error bar in forty is
+three times too small (256 lanes of Ueda's oscillator)."""
 RANK_TOLERANCE = 1e-3
-"""Parts of a strobe orbit below this fraction of the largest one are left out of its linear model."""
+"""Smallest singular value, relative to the largest, that is kept in the linear model of a strobe orbit."""
 
 
 def motion_size(
@@ -39,10 +39,7 @@ def motion_size(
 def closing_tolerance(
     strobe: Float[np.ndarray, "*lanes keep dim"], scale: Float[np.ndarray, "*#lanes dim"]
 ) -> Float[np.ndarray, "*lanes"]:
-    """Distance within which a strobe orbit must return, in units of the scale: 1e-4 of the size of the motion.
-
-    The size is taken to be at most the scale and at least 1e-6 of it.
-    """
+    """Distance within which a strobe orbit must return [scale]: 1e-4 of the size of its motion, within 1e-6 to 1."""
     return np.asarray(CLOSING_TOLERANCE * np.clip(motion_size(strobe, scale), SMALLEST_MOTION, 1.0))
 
 
@@ -51,12 +48,11 @@ def closing_period(
 ) -> Int[np.ndarray, "*lanes"]:
     """Smallest k <= 8 for which every kept strobe state returns after k revolutions; 0 where there is none.
 
-    A lane that spirals towards an orbit of period j may return after k > j revolutions, if these bring it nearly round,
-    before it returns after j: its states move away from where they were j revolutions ago as those of an orbit of
-    period k do. But that distance dies out with the one after k revolutions, where an orbit keeps it. Such lanes have
-    the period j.
+    A lane that spirals towards an orbit of period j may return to within the tolerance after k > j revolutions, if k is
+    nearly a full turn of the spiral, before it does after j. Unlike on an orbit of period k, its distance after j
+    revolutions decays together with that after k: such lanes have the period j.
 
-    Coordinates and velocities alike are compared in units of `scale`, to within `closing_tolerance`.
+    Coordinates and velocities are compared in units of `scale`, to within `closing_tolerance`.
     """
     states = strobe / scale[..., None, :]
     tolerance = closing_tolerance(strobe, scale)[..., None]
@@ -76,20 +72,19 @@ def closing_period(
 
 
 def _remains(apart: Float[np.ndarray, "*lanes some"]) -> Float[np.ndarray, "*lanes"]:
-    """Largest distance in the second half of the kept states over that in the first; 1 where there were none."""
+    """Largest distance in the second half of the kept states over that in the first; 1 where the latter is zero."""
     half = max(apart.shape[-1] // 2, 1)
     before, after = (np.max(x, axis=-1) for x in (apart[..., :half], apart[..., -half:]))
     return np.divide(after, before, out=np.ones_like(after), where=before > 0)
 
 
 def decay(states: Float[np.ndarray, "keep dim"]) -> tuple[float, float]:
-    """Factor by which a strobe orbit shrinks in a revolution, and an error of it: (0.98, 1e-4), say, for a slow spiral
-    onto an orbit with a multiplier of 0.98, and 1 within the error for a torus.
+    """Factor by which a strobe orbit shrinks per revolution, and its error: 1 within the error for a torus.
 
     A linear model x[n+1] = A x[n] of the steps from state to state, with delayed steps as further components, is fitted
     by least squares on the leading singular vectors (dynamic mode decomposition, P. J. Schmid, J. Fluid Mech. 656,
     2010). The factor is the modulus of the eigenvalue of its largest mode; the error is a quarter of the relative
-    residual of the fit, and 1e-4.
+    residual of the fit plus 1e-4.
 
     **Arguments:** strobe states in units of the scale, twelve or more; with fewer the error is infinite.
     """
@@ -112,7 +107,7 @@ def decay(states: Float[np.ndarray, "keep dim"]) -> tuple[float, float]:
 
 
 def scatter(blocks: Float[np.ndarray, "..."], axis: int = -1) -> Float[np.ndarray, "..."]:
-    """Standard error of the mean of blocks along an axis; infinite for a single one."""
+    """Standard error of the mean of blocks along an axis; infinite for a single block."""
     count = blocks.shape[axis]
     if count < 2:
         return np.full(np.delete(blocks.shape, axis), np.inf)
@@ -126,10 +121,10 @@ def label_lanes(
     exponent: Float[np.ndarray, "*lanes"],
     standard_error: Float[np.ndarray, "*lanes"],
 ) -> Shaped[np.ndarray, "*lanes"]:
-    """Labels of lanes, by the rule at the top of this file.
+    """Labels of lanes by the rule at the top of this file.
 
-    **Arguments:** codes of the outcomes; the last strobe states, and the scale of each component; largest exponents per
-    revolution with their standard errors, NaN where none was computed.
+    **Arguments:** codes of the outcomes; last strobe states, and the scale of each component; largest exponents per
+    revolution and their standard errors, NaN where none was computed.
     """
     period = closing_period(strobe, scale)
     labels = np.full(np.shape(period), "undecided", dtype="<U14")
@@ -150,7 +145,7 @@ def on_torus(
     exponent: Float[np.ndarray, "*lanes"],
     standard_error: Float[np.ndarray, "*lanes"],
 ) -> Bool[np.ndarray, "*lanes"]:
-    """Lanes whose exponent is resolved as zero, and whose strobe orbit neither shrinks nor grows."""
+    """True for lanes whose exponent is resolved as zero, and whose strobe orbit neither shrinks nor grows."""
     states = strobe / scale[..., None, :]
     resolved = (np.abs(exponent) <= TORUS_THRESHOLD) & (2 * standard_error <= TORUS_THRESHOLD)
     found = np.zeros(resolved.shape, dtype=bool)
@@ -161,8 +156,7 @@ def on_torus(
 
 
 def too_few_revolutions(label: Shaped[np.ndarray, "*lanes"], revolutions: int) -> Bool[np.ndarray, "*lanes"]:
-    """Lanes whose label needs more revolutions than were observed: they are undecided, or rest on an exponent of so few
-    revolutions that its standard error is not known."""
+    """True for lanes that are undecided, or labelled by an exponent with too few revolutions for its standard error."""
     by_exponent = np.isin(label, ("quasi-periodic", "chaotic"))
     return (label == "undecided") | (by_exponent & (revolutions < FEWEST_REVOLUTIONS))
 
@@ -174,11 +168,11 @@ def revolutions_to_decide(
     standard_error: float,
     revolutions: int,
 ) -> float:
-    """Estimate of the revolutions to be observed until an undecided lane has a label; infinite without an estimate.
+    """Estimated number of revolutions that must be observed to label an undecided lane; infinite without an estimate.
 
     A strobe orbit that shrinks closes when its steps have shrunk to the tolerance. Otherwise the exponent decides: its
-    standard error falls as the square root of the number of revolutions. A periodic orbit that takes more than eight
-    revolutions, whose exponent is negative while it does not shrink, has no label however long it is observed.
+    standard error falls as the inverse square root of the number of revolutions. An orbit whose period exceeds eight
+    revolutions, with a negative exponent although it does not shrink, never gets a label.
     """
     factor, error = decay(strobe / scale)
     apart = np.linalg.norm(np.diff(strobe[-LONGEST_PERIOD:] / scale, axis=0), axis=-1).max()
@@ -193,19 +187,19 @@ def revolutions_to_decide(
 
 
 CIRCULAR, REPEATING = 0.1, 0.1
-"""Variation of the eccentricity relative to its mean below which a whirling centre is `circular`; distance in
-clearances, between places a revolution apart, below which the motion is `locally_periodic`."""
+"""Largest variation of the eccentricity relative to its mean for `circular` motion; largest mean distance in
+clearances between positions one revolution apart for `locally_periodic` motion."""
 MOTIONS = ("circular", "locally_periodic", "disordered")
 
 
 def motion_label(place: Float[np.ndarray, "n 2"], samples: int) -> str:
-    """Name of the motion of a cage's centre, after those that the literature of cage stability uses.
+    """Name of the motion of a cage's centre, in the terms of the literature on cage stability.
 
-    `circular`: the centre goes round at least once in ten revolutions of the cage, and its eccentricity varies
-    (standard deviation over mean) by less than `CIRCULAR`. `locally_periodic`: not so, but after a revolution the
-    centre is, in the mean over all samples, within `REPEATING` clearances of its place before. `disordered`: neither.
+    `circular`: the centre whirls at least once in ten revolutions of the cage (and once in all), and its eccentricity
+    varies (standard deviation over mean) by less than `CIRCULAR`. `locally_periodic`: otherwise, if the mean distance
+    of positions one revolution apart is below `REPEATING` clearances. `disordered`: neither. `failed`: not finite.
 
-    **Arguments:** place over clearance, at equal angles of the cage; samples per revolution.
+    **Arguments:** position over clearance, at equal angles of the cage; samples per revolution.
     """
     if not np.all(np.isfinite(place)):
         return "failed"

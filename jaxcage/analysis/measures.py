@@ -17,14 +17,14 @@ from .labels import scatter
 
 
 BATCH = 256
-"""Samples whose forces are worked out at a time."""
+"""Number of samples whose forces are computed at a time."""
 
 
 @compiled
 def _forces(
     model: CageModel, speed: Float[Array, " n"], tau: Float[Array, " n"], motion: Float[Array, "n 4"]
 ) -> dict[str, tuple[Array, Array, Array]]:
-    """(F_x, F_y, moment) of each force at every sample."""
+    """Components and moment (F_x, F_y, M) of each force at every sample."""
 
     def at(sample: tuple[Array, Array, Array]) -> dict[str, Force]:
         omega, t, m = sample
@@ -34,7 +34,7 @@ def _forces(
 
 
 def cage_history(model: CageModel, trajectory: Trajectory) -> CageHistory:
-    """Motion of a cage relative to the rib along a trajectory, and the forces on it.
+    """Motion of a cage relative to the rib along a trajectory, and the forces on the cage.
 
     **Raises:** `ValueError` for a trajectory of another model.
     """
@@ -46,7 +46,7 @@ def cage_history(model: CageModel, trajectory: Trajectory) -> CageHistory:
     position, velocity = (q, v) if dim == 4 else (q[:, :2] - q[:, 2:], v[:, :2] - v[:, 2:])
     motion = np.concatenate([position, velocity], axis=1)
     along = _forces(model, *map(jax.numpy.asarray, (trajectory.speed, trajectory.tau, motion)))
-    names = (*FORCES, *(type(law).__name__ for law in model.extra))  # programs return a dictionary sorted
+    names = (*FORCES, *(type(law).__name__ for law in model.extra))  # compiled functions sort the keys of dictionaries
     return CageHistory(
         speed=trajectory.speed,
         phase=float(trajectory.tau[-1] - trajectory.tau[0]),
@@ -63,8 +63,8 @@ def cage_history(model: CageModel, trajectory: Trajectory) -> CageHistory:
 def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.ndarray, "n 2"]]:
     """Every force on the cage along a trajectory of `model`.
 
-    **Returns:** `film`, `contact`, `support`, `impact`, `unbalance`, `weight` and those of the model's `extra`
-    by the names of their classes, each (F_x, F_y) [N] at every sample, at the speed of that sample.
+    **Returns:** `film`, `contact`, `support`, `impact`, `unbalance`, `weight` and the model's `extra` laws by the names
+    of their classes, each (F_x, F_y) [N] at every sample, at the speed of that sample.
     """
     return dict(cage_history(model, trajectory).forces)
 
@@ -75,14 +75,14 @@ class Measured(NamedTuple):
     quantity: Quantity
     value: float
     error: float
-    """Standard error from the scatter of revolutions, NaN where there is none."""
+    """Standard error from the scatter of revolutions, NaN if not known."""
 
 
 class Measures(dict[str, Measured]):
     """Quantities of a time history by name; printed, a table with units."""
 
     def value(self, name: str) -> float:
-        """The value of a quantity [SI]."""
+        """Value of a quantity [SI]."""
         return self[name].value
 
     def __str__(self) -> str:
@@ -97,7 +97,7 @@ class Measures(dict[str, Measured]):
 
 
 def measures(model: AbstractForcedSystem, trajectory: Trajectory) -> Measures:
-    """Quantities of a time history that its model reports, best over whole revolutions without the transient.
+    """Quantities of a time history, preferably of whole revolutions without the transient, that its model reports.
 
     **Raises:** `ValueError` for a trajectory that failed, or of fewer than 3 samples.
     """
@@ -116,7 +116,7 @@ def measures(model: AbstractForcedSystem, trajectory: Trajectory) -> Measures:
 
 
 def _from_integrals(model: AbstractForcedSystem, trajectory: Trajectory) -> Measures:
-    """Quantities from integrals over each revolution and largest values in it."""
+    """Quantities from the integrals and the maxima over each revolution."""
     samples = trajectory.samples
     each = np.diff(trajectory.integrals[::samples], axis=0)
     largest = trajectory.peaks[: len(each) * samples].reshape(len(each), samples, -1).max(axis=1)

@@ -12,35 +12,35 @@ from .spectra import OrderSpectrum, Peak, dominant_orders, spectrum_of
 
 
 PARTS = 36
-"""Parts of the circumference."""
+"""Number of parts of the circumference."""
 SHARES = (0.5, 0.9, 0.99, 0.999)
-"""Shares of the time, for the distribution of the pocket forces."""
+"""Fractions of the contact time at which the distribution of the pocket forces is evaluated."""
 LINES = 5
-"""Lines of a spectrum that are named."""
+"""Number of lines of a spectrum that are named."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Around:
-    """Means over time at each place of the circumference; NaN where no roller was."""
+    """Means over time in each part of the circumference; NaN where there was no roller."""
 
     angle: Float[np.ndarray, " bins"]
     """Middle of each part of the circumference, counter-clockwise from the x axis, 0 to 2 pi; the load points to
     3 pi/2."""
     roller_slip: Float[np.ndarray, " bins"]
     inner_sliding: Float[np.ndarray, " bins"]
-    """[m/s]."""
+    """Mean sliding speed at the inner ring [m/s]."""
     inner_load: Float[np.ndarray, " bins"]
-    """Load of a roller there [N]."""
+    """Mean load between a roller and the inner ring [N]."""
     driving_force: Float[np.ndarray, " bins"]
-    """Mean pocket force by which a roller there drives the cage, times without contact counted as zero [N]."""
+    """Mean pocket force by which a roller drives the cage, counted as zero without contact [N]."""
     braking_force: Float[np.ndarray, " bins"]
-    """Mean pocket force by which a roller there holds the cage back [N]."""
+    """Mean pocket force by which a roller brakes the cage, counted as zero without contact [N]."""
     largest_force: Float[np.ndarray, " bins"]
-    """Largest pocket force at a sample."""
+    """Largest pocket force at any sample [N]."""
 
 
 def around(history: RollerHistory) -> Around:
-    """Slips, loads and pocket forces over the circumference, from all rollers as they pass."""
+    """Slips, loads and pocket forces around the circumference, averaged over all rollers."""
     bins = PARTS
     where = np.floor(np.mod(history.roller_angle, 2 * np.pi) * bins / (2 * np.pi)).astype(int) % bins
     weight = np.broadcast_to(np.gradient(history.time)[:, None], where.shape)
@@ -62,7 +62,7 @@ def around(history: RollerHistory) -> Around:
 
 
 def pocket_force_distribution(history: RollerHistory) -> dict[str, float]:
-    """Share of the time in which a pocket is in contact, and forces [N] not exceeded in given shares of that time."""
+    """Fraction of the time in which a pocket is in contact, and quantiles of the force [N] over that time."""
     force = np.abs(history.pocket_force)
     weight = np.broadcast_to(np.gradient(history.time)[:, None], force.shape)
     touching = force > 0
@@ -76,7 +76,7 @@ def pocket_force_distribution(history: RollerHistory) -> dict[str, float]:
 
 
 def bearing_spectra(history: RollerHistory) -> dict[str, OrderSpectrum]:
-    """Amplitude spectra, by orders of the cage's speed: of the cage's vertical place over the clearance, and of the
+    """Amplitude spectra, over orders of the cage speed, of the cage's vertical position over the clearance and of the
     vertical force of all pockets on the cage [N].
 
     **Raises:** `ValueError` for fewer than 2 revolutions.
@@ -91,7 +91,7 @@ def bearing_spectra(history: RollerHistory) -> dict[str, OrderSpectrum]:
 
 @dataclasses.dataclass(frozen=True)
 class NamedLine:
-    """A line of a spectrum with the frequency of the bearing that it is at, if one is within a line's width."""
+    """A line of a spectrum, with the name of the bearing frequency within one bin of it, if there is one."""
 
     order: float
     amplitude: float
@@ -99,7 +99,7 @@ class NamedLine:
 
 
 def named_lines(spectrum: OrderSpectrum, orders: Mapping[str, float], count: int = LINES) -> list[NamedLine]:
-    """The largest lines of a spectrum, largest first, with names out of `orders`."""
+    """Largest lines of a spectrum, in descending order, with names from `orders`."""
 
     def name(peak: Peak) -> str | None:
         nearest = min(orders, key=lambda k: abs(orders[k] - peak.order))

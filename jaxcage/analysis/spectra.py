@@ -1,6 +1,6 @@
-"""Spectra by orders: multiples of the cage speed, so that order 1 is synchronous at every speed.
+"""Order spectra: over multiples of the cage speed, so that order 1 is synchronous at every speed.
 
-A time history is sampled evenly in phase, so that its spectrum is over orders even when the speed ramps.
+A time history is sampled evenly in phase, so that its spectrum is over orders even if the speed varies.
 """
 
 import dataclasses
@@ -19,28 +19,27 @@ class Peak(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class OrderSpectrum:
-    """Amplitudes by order of the speed, by a Hann window: a sine of amplitude a shows a, halfway between two bins 15 %
-    less."""
+    """Amplitude spectrum over orders, with a Hann window: a sine is up to 15 % too small if it is between two bins."""
 
     order: Float[np.ndarray, " orders"]
-    """Order, a multiple of the cage speed, ascending."""
+    """Multiples of the cage speed, ascending."""
     amplitude: Float[np.ndarray, " orders"]
-    """Amplitude in the unit of the signal; the mean at order 0."""
+    """Amplitudes in the unit of the signal; the mean at order 0."""
 
     @property
     def resolution(self) -> float:
-        """Distance of neighbouring orders, one over the number of revolutions."""
+        """Spacing of the orders, one over the number of revolutions."""
         return float(self.order[1] - self.order[0])
 
     def at(self, order: float | int) -> float:
-        """Amplitude at the bin nearest to `order`."""
+        """Amplitude at the order nearest to `order`."""
         return float(self.amplitude[np.argmin(np.abs(self.order - order))])
 
 
 def spectrum_of(signal: Float[np.ndarray, " n"], samples: int) -> OrderSpectrum:
-    """One-sided amplitude spectrum of a quantity at evenly spaced angles, up to half the samples per revolution.
+    """One-sided amplitude spectrum of a signal at evenly spaced angles, up to half the samples per revolution.
 
-    The mean is taken out first, which keeps its skirts out of the lowest orders, and put back.
+    The mean is subtracted first, to avoid leakage into the lowest orders, and inserted at order 0.
 
     **Arguments:** values over whole revolutions, so that integer orders fall on bins; samples per revolution.
     """
@@ -56,21 +55,17 @@ def spectrum_of(signal: Float[np.ndarray, " n"], samples: int) -> OrderSpectrum:
 def _hann_line(ratio: float) -> tuple[float, float]:
     """Offset in bins and amplitude factor of a line: r is the ratio of its larger neighbour to it.
 
-    The main lobe of the Hann window is sinc(d)/(1 - d^2), so the ratio of two neighbours gives the
-    offset d = (2 r - 1)/(r + 1) exactly for a single line (T. Grandke, IEEE Trans. Instrum. Meas.
-    32 (1983) 350).
+    The main lobe of the Hann window is sinc(d)/(1 - d^2), so the ratio of two neighbours gives the offset
+    d = (2 r - 1)/(r + 1) exactly for a single line (T. Grandke, IEEE Trans. Instrum. Meas. 32 (1983) 350).
     """
     d = min(max((2 * ratio - 1) / (ratio + 1), 0.0), 0.5)
     return d, (1 - d * d) / float(np.sinc(d))
 
 
 def dominant_orders(spectrum: OrderSpectrum, count: int = 5, *, floor: float | int = 0.01) -> tuple[Peak, ...]:
-    """The largest lines of a spectrum, largest first, the mean left out.
+    """Largest lines of a spectrum, in descending order and without the mean, interpolated between the bins.
 
-    Order and amplitude are interpolated between the bins.
-
-    **Arguments:** the spectrum; how many lines at most; the smallest amplitude that counts, as a
-    part of the largest.
+    **Arguments:** spectrum; maximum number of lines; smallest amplitude, as a fraction of the largest.
     """
     order = spectrum.order
     a = np.where(order == 0, 0.0, spectrum.amplitude)

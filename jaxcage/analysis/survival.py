@@ -1,25 +1,26 @@
-"""Telling an attractor from a chaotic transient: how long lanes stay chaotic, with an error.
+"""Mean life of chaos, with an error, from the times at which lanes leave it: an attractor or a chaotic transient.
 
-Lanes that start near a chaotic set which attracts nothing for ever leave it one by one, at a rate that after a short
-time t0 no longer depends on where they came from: of N lanes N exp(-t/tau) are left after t. Followed for long enough,
-they tell tau; where none leaves, a lower bound of tau is all that they tell. No run proves an attractor.
+Lanes leave a chaotic set that is not an attractor one by one, after a short time t0 at a rate that no longer depends on
+their initial states: of N lanes N exp(-t/tau) remain after t. The escapes yield an estimate of tau; without escapes
+only a lower bound of tau is known. No finite run proves an attractor. Lanes that are periodic or quasi-periodic, or
+approach such a motion, are called calm.
 
 Y.-C. Lai and T. Tel, Transient Chaos (Springer 2011); E. G. Altmann, J. S. E. Portela and T. Tel, Leaking chaotic
 systems, Rev. Mod. Phys. 85 (2013) 869-918.
 
-Lanes are seen block by block, so that an escape is only known to lie within a block of b revolutions. Of E revolutions
-survived in whole blocks and n escapes the most likely mean life is
+An escape is only known to lie within a block of b revolutions. With E revolutions survived in whole blocks and n
+escapes the maximum-likelihood estimate of the mean life is
 
     tau = b / log(1 + n b / E),
 
-which is E/n for short blocks, and E/n + b/2 to first order: what those that escaped survived of their last block. It is
-the inverse 1/kappa of the escape rate of continuous time; lanes that survive a block with probability q have
-kappa = -log(q) / b. For an iterated map b = 1. A delay between an escape and the sign of it does not matter, as long as
-it is the same, or as random, early and late. Lanes must be independent: initial states spread over states, not over
-rounding errors.
+which is E/n for short blocks, and E/n + b/2 to first order: b/2 is the part of its last block that a lane survived. It
+is the inverse 1/kappa of the escape rate in continuous time; lanes that survive a block with probability q have
+kappa = -log(q) / b. For an iterated map b = 1. A delay between an escape and its detection does not matter if its
+distribution does not change with time. Lanes must be independent: their initial states must differ by more than
+rounding.
 
-Limits. A lane that leaves one chaotic set for another has not escaped here, and one in a laminar phase at its very end
-may seem to have. Weak chaos needs long blocks.
+Limits. A lane that leaves one chaotic set for another does not count as escaped, and one in a laminar phase at its very
+end may be counted as escaped. Weak chaos needs long blocks.
 """
 
 import dataclasses
@@ -35,17 +36,17 @@ from .labels import CHAOS_THRESHOLD, TORUS_THRESHOLD, closing_period, scatter
 
 
 CONFIRM = 8
-"""Blocks at the end of a run in which a lane must be calm if it is to have escaped."""
+"""Number of blocks at the end of a run in which a lane must be calm to count as escaped."""
 FEW = 10
-"""With fewer escapes an interval is given instead of a standard error."""
+"""Smallest number of escapes for which a standard error is reported instead of an interval."""
 
 
 def calm_threshold(block: int) -> float:
-    """Largest mean growth per revolution of a calm block of so many revolutions.
+    """Largest mean growth per revolution at which a block of `block` revolutions counts as calm (not chaotic).
 
-    On a periodic orbit or a torus the length of a tangent vector goes up and down by a factor that does not depend on
-    how long the block is; e^2 is allowed for, a mean growth of 2/block. Chaos of exponent lambda grows by lambda, with
-    a scatter: it shows in most blocks where lambda * block exceeds 4. Where it is weaker, blocks must be longer.
+    On a periodic orbit or a torus the length of a tangent vector varies by a factor that is independent of the length
+    of the block; e^2 is allowed for, a mean growth of 2/block. In chaos with exponent lambda the mean growth scatters
+    about lambda and is above the threshold in most blocks if lambda * block exceeds 4; weaker chaos needs longer ones.
     """
     return max(CHAOS_THRESHOLD, 2 / block)
 
@@ -56,13 +57,13 @@ def calm_at_the_end(
     growth: Float[np.ndarray, "lanes blocks"],
     block: int,
 ) -> Bool[np.ndarray, " lanes"]:
-    """Lanes that end on a periodic orbit or a torus, or on their way to one.
+    """True for lanes that end on a periodic orbit or a torus, or approach one.
 
     A lane is calm at the end if its last strobe states close with a period up to 8, or if the exponent of its last
-    blocks is zero or below within its error: two standard errors, and what blocks of that length cannot tell.
+    blocks is at most zero within its error: the larger of two standard errors and the resolution of these blocks.
 
-    **Arguments:** the last strobe states; characteristic magnitudes of the state; mean growth per revolution of each
-    block; revolutions per block.
+    **Arguments:** last strobe states; scale of each component; mean growth per revolution of each block; revolutions
+    per block.
     """
     end = growth[:, -CONFIRM:]
     exponent = np.mean(end, axis=1)
@@ -78,27 +79,27 @@ def escape_times(
     *,
     failed: Bool[np.ndarray, " lanes"] | None = None,
 ) -> tuple[Float[np.ndarray, " lanes"], int]:
-    """After how many revolutions each lane stays calm to the end of the run.
+    """Escape time of each lane, after which it is calm until the end of the run, and the horizon.
 
-    Chaos dips: with an exponent of 0.15 and a scatter of 0.1 between blocks of 25 revolutions one block in four cannot
-    be told from calm. So a lane escapes after the last block that is not calm, and only if it is calm at the end by its
-    label too, and in the last `CONFIRM` blocks. A chaotic lane of which a share p of the blocks dips passes for escaped
-    with a probability of p**CONFIRM at most.
-    Where p comes near 1, chaos is too weak for the blocks, and lanes seem calm long before they are.
+    Single blocks of a chaotic lane may look calm: with an exponent of 0.15 and a scatter of 0.1 between blocks of 25
+    revolutions, one in four does. So a lane escapes after its last block that is not calm, and only if it is calm in
+    the last `CONFIRM` blocks, and at the end by `calm_end`. A chaotic lane of which a fraction p of the blocks looks
+    calm is counted as escaped with a probability of at most p**CONFIRM. If p is near 1, chaos is too weak for this
+    length of block, and lanes seem to escape too early.
 
-    What happens in those last blocks is not judged: the time to which lanes are followed, the horizon, ends before
-    them. A lane that escapes later was still chaotic at the horizon.
+    The horizon, to which lanes are followed, is the beginning of those last blocks: a lane that escapes later is
+    chaotic at the horizon.
 
     **Arguments:**
 
     - `growth`: mean logarithmic growth per revolution (the windowed exponent) of each block.
-    - `calm_end`: lanes that end on a periodic orbit or a torus (`calm_at_the_end`).
+    - `calm_end`: True for lanes that end on a periodic orbit or a torus (`calm_at_the_end`).
     - `block`: revolutions per block.
     - `failed`: lanes that did not finish; those with growth that is not finite have failed, too.
 
-    **Returns:** for each lane the revolutions after which it is calm, counted from the first block, a multiple of
-    `block`: 0 for one that always is, infinity for one that is chaotic at the horizon, NaN for one that failed; and the
-    horizon [revolutions].
+    **Returns:** for each lane the revolutions from the first block to its escape, a multiple of `block`: 0 for one that
+    is always calm, infinity for one that is chaotic at the horizon, NaN for one that failed; and the horizon
+    [revolutions].
     """
     lanes, blocks = growth.shape
     lost = ~np.all(np.isfinite(growth), axis=1) | (np.zeros(lanes, dtype=bool) if failed is None else failed)
@@ -111,16 +112,16 @@ def escape_times(
 
 @dataclasses.dataclass(frozen=True)
 class Survival:
-    """How long lanes stayed chaotic after t0: escapes counted, mean life estimated."""
+    """Counts of escapes from chaos after t0, and the estimated mean life."""
 
     lanes: int
-    """Lanes that finished."""
+    """Number of lanes that finished."""
     failed: int
-    """Lanes that did not, and are left out."""
+    """Number of lanes that failed, and are left out."""
     calm: int
-    """Lanes that were calm at t0: no escapes, for nothing says that they ever were in the chaotic set."""
+    """Number of lanes that were calm at t0; not escapes, since they may never have been in the chaotic set."""
     escapes: int
-    """Lanes that were chaotic at t0 and calm at the horizon."""
+    """Number of lanes that were chaotic at t0 and calm at the horizon."""
     survived: float
     """Revolutions survived after t0 in whole blocks, summed over lanes."""
     t0: float
@@ -128,18 +129,17 @@ class Survival:
     horizon: float
     """Revolutions to which lanes were followed."""
     block: float
-    """Revolutions within which an escape is known; 0 where it is known exactly."""
+    """Resolution of the escape times [revolutions]; 0 if they are known exactly."""
 
     @property
     def chaotic(self) -> int:
-        """Lanes that were chaotic at t0."""
+        """Number of lanes that were chaotic at t0."""
         return self.lanes - self.calm
 
     @property
     def kind(self) -> str:
-        """`transient`: lanes escaped. `chaotic`: none did. `coexisting`: none did, but some were calm at t0 already.
-        `calm`: none was chaotic at t0.
-        """
+        """Kind of chaos: `transient`, lanes escaped; `chaotic`, none did; `coexisting`, none did, but some were calm at
+        t0; `calm`, none was chaotic at t0."""
         if not self.chaotic:
             return "calm"
         if self.escapes:
@@ -148,12 +148,12 @@ class Survival:
 
     @property
     def remaining(self) -> float:
-        """Share of the lanes that were chaotic at t0 and still are at the horizon; NaN for none."""
+        """Fraction of the lanes chaotic at t0 that are chaotic at the horizon; NaN without any."""
         return 1 - self.escapes / self.chaotic if self.chaotic else math.nan
 
     @property
     def rate(self) -> float:
-        """Escape rate kappa [1/revolution]: 0 without escapes, infinite where all escaped in the first block."""
+        """Escape rate kappa [1/revolution]: 0 without escapes, infinite if all escaped in the first block."""
         n, b, survived = self.escapes, self.block, self.survived
         if not n:
             return 0.0
@@ -168,10 +168,8 @@ class Survival:
 
     @property
     def standard_error(self) -> float:
-        """Standard error of the mean life [revolutions]: relative 1/sqrt(n) for short blocks; NaN where unknown.
-
-        From the information in the counts of blocks: times sinh(x/2)/(x/2), with x the block in units of the mean life.
-        """
+        """Standard error of the mean life [revolutions], NaN if unknown: from the Fisher information of the counts of
+        blocks, relative sinh(x/2)/(x/2) / sqrt(n), with x the block in units of the mean life."""
         if not self.escapes or not self.survived:
             return math.nan
         half = self.block * self.rate / 2
@@ -179,20 +177,20 @@ class Survival:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Interval of 95 % for the mean life [revolutions], for any number of escapes.
+        """Confidence interval (95 %) for the mean life [revolutions], for any number of escapes.
 
-        From the exact limits of a Poisson count (F. Garwood, Biometrika 28 (1936) 437), or of a binomial one where
-        escapes are only known by the block (C. J. Clopper and E. S. Pearson, Biometrika 26 (1934) 404).
+        From the exact limits of a Poisson count (F. Garwood, Biometrika 28 (1936) 437), or of a binomial one if escapes
+        are only known by the block (C. J. Clopper and E. S. Pearson, Biometrika 26 (1934) 404).
         """
         return self._limit(0.975), self._limit(0.025)
 
     @property
     def lower_bound(self) -> float:
-        """Lower limit of the mean life at 95 % [revolutions], one-sided: E/3 where nothing escaped."""
+        """One-sided lower limit (95 %) of the mean life [revolutions]: E/3 without escapes."""
         return self._limit(0.95) if self.escapes else self.survived / 3
 
     def _limit(self, level: float) -> float:
-        """Mean life at which the escape rate has its limit of this level: high rate, short life."""
+        """Limit of the mean life, from the quantile `level` of the escape rate: a high rate is a short life."""
         n = self.escapes
         if not self.chaotic or (n == 0 and level < 0.5):
             return math.inf if self.chaotic else math.nan
@@ -228,11 +226,10 @@ class Survival:
 def survival(
     times: Float[np.ndarray, " lanes"], horizon: float | int, *, t0: float | int = 0, block: float | int = 0
 ) -> Survival:
-    """Censored maximum likelihood of the mean life from escape times.
+    """Estimate the mean life from escape times by censored maximum likelihood.
 
     Lanes that failed, or are calm at t0, are left out. Those that escape after the horizon, or never, are censored at
-    the time to which they were followed. Lanes that start off the chaotic set need a t0 of several e-foldings of their
-    approach to it.
+    the horizon. If lanes start off the chaotic set, t0 must be several e-foldings of their approach to it.
 
     **Arguments:**
 
@@ -240,8 +237,7 @@ def survival(
         map, the number of the first iterate that is outside.
     - `horizon`: time to which lanes were followed [revolutions].
     - `t0`: time left out at the beginning [revolutions].
-    - `block`: revolutions within which an escape is known: one at time t happened in (t - block, t]. 0 for exact times,
-        1 for a map.
+    - `block`: resolution of the times: an escape at t happened in (t - block, t]; 0 for exact times, 1 for a map.
 
     **Raises:** `ValueError` for a horizon not beyond t0, and for a t0 or times that do not end a block.
     """

@@ -1,4 +1,4 @@
-"""Results of a sweep by speed: share of chaos, its mean life, lanes without a certain label."""
+"""Results of a sweep by speed: fraction of chaotic lanes, mean life of chaos, lanes without a certain label."""
 
 import collections
 import json
@@ -14,20 +14,20 @@ from .survival import Survival, survival
 
 
 SMALL = 1e-3
-"""Size of the motion, in units of the scale, below which it is reported."""
+"""Size of the motion, in units of the scale, below which it is reported as too small for the scale."""
 LIFE_BLOCK = 30
-"""Revolutions within which an escape from chaos is known."""
+"""Resolution of the times of escapes from chaos [revolutions]."""
 UNKNOWN = ("failed", "inaccurate", "pending")
-"""Labels of lanes of which nothing is known."""
+"""Labels of lanes without a usable result."""
 
 
 def failed(found: xr.Dataset) -> Bool[np.ndarray, "*lanes"]:
-    """Lanes of which nothing is known: their integration failed, or is not accurate enough."""
+    """True for lanes without a usable result: they failed, are inaccurate, or have not been run."""
     return np.isin(found["label"].values, UNKNOWN)
 
 
 def length(found: xr.Dataset) -> str:
-    """Revolutions discarded, observed and followed, in words."""
+    """Text with the numbers of revolutions discarded, observed and followed."""
     lasting = f", chaos followed to {found.attrs['horizon']}" if found.attrs["horizon"] else ""
     return f"{found.attrs['discard']} + {found.attrs['revolutions']} revolutions{lasting}"
 
@@ -39,14 +39,14 @@ def resolution_rpm(found: xr.Dataset) -> float:
 
 
 def restless(found: xr.Dataset) -> Bool[np.ndarray, "*speeds"]:
-    """Speeds at which some lane is or was chaotic while observed."""
+    """True for speeds at which at least one lane is, or was while observed, chaotic."""
     return np.asarray(np.isin(found["label"].values, ("chaotic", "transient")).any(axis=-1))
 
 
 def survival_at(found: xr.Dataset, i: int) -> Survival:
-    """Survival of chaos at the i-th speed, from all lanes there and at the speeds next to it.
+    """Survival of chaos at the i-th speed, from all lanes at that speed and at its two neighbours.
 
-    **Raises:** `ValueError` where lanes were not followed to a horizon.
+    **Raises:** `ValueError` if lanes were not followed to a horizon.
     """
     if "escape" not in found:
         raise ArgumentError("horizon", said="of the sweep must be given for this, but lanes were not followed.")
@@ -56,7 +56,7 @@ def survival_at(found: xr.Dataset, i: int) -> Survival:
 
 
 def lasting(found: xr.Dataset) -> Bool[np.ndarray, " speeds"]:
-    """Speeds at which chaos lasts: by its mean life beyond the horizon, if lanes were followed to one."""
+    """True for speeds with chaos whose mean life, if lanes were followed to a horizon, is at least the horizon."""
     chaotic = restless(found)
     if "escape" not in found:
         return chaotic
@@ -65,22 +65,21 @@ def lasting(found: xr.Dataset) -> Bool[np.ndarray, " speeds"]:
 
 
 def chaotic_share(found: xr.Dataset) -> Float[np.ndarray, " speeds"]:
-    """Share of the finished lanes at each speed that are chaotic while observed; NaN where every lane failed."""
+    """Fraction of the finished lanes at each speed that are chaotic while observed; NaN where every lane failed."""
     finished = np.sum(~failed(found), axis=1)
     chaotic = np.sum(np.isin(found["label"].values, ("chaotic", "transient")), axis=1)
     return np.where(finished > 0, chaotic / np.maximum(finished, 1), np.nan)
 
 
 def too_short(found: xr.Dataset) -> Bool[np.ndarray, "*lanes"]:
-    """Lanes that are undecided, or labelled by an exponent of too few revolutions for its error bar."""
+    """True for lanes that are undecided, or labelled by an exponent with too few revolutions for its standard error."""
     if not found.sizes["exponent"] or "strobe" not in found:
         return np.zeros(found["label"].shape, dtype=bool)
     return too_few_revolutions(found["label"].values, found.attrs["revolutions"])
 
 
 def to_decide(found: xr.Dataset) -> Float[np.ndarray, "*lanes"]:
-    """Estimate of the revolutions to be observed until each undecided lane has a label; infinite where there is no
-    estimate, 0 for the other lanes."""
+    """Estimated revolutions that must be observed to label each undecided lane; infinite if unknown, 0 for others."""
     needed = np.zeros(found["label"].shape)
     if not found.sizes["exponent"] or "strobe" not in found:
         return needed
@@ -93,27 +92,27 @@ def to_decide(found: xr.Dataset) -> Float[np.ndarray, "*lanes"]:
 
 
 def cure(found: xr.Dataset) -> str:
-    """Revolutions that would give undecided lanes a label, as the end of a sentence; empty without an estimate."""
+    """End of a sentence with the revolutions that would decide undecided lanes; empty without an estimate."""
     needed = to_decide(found)
     some = needed[(needed > 0) & np.isfinite(needed)]
     return f": about {np.max(some):.2g} observed revolutions would decide {some.size} of them" if some.size else ""
 
 
 def small(found: xr.Dataset) -> Bool[np.ndarray, "*lanes"]:
-    """Lanes whose motion is below a thousandth of the model's scale: the scale does not fit it."""
+    """True for lanes whose motion is below a thousandth of the model's scale, which is then too large."""
     if "strobe" not in found:
         return np.zeros(found["label"].shape, dtype=bool)
     return motion_size(found["strobe"].values, found["scale"].values) < SMALL
 
 
 def outcomes(found: xr.Dataset) -> dict[str, int]:
-    """Number of lanes that did not finish, by how they ended."""
+    """Number of lanes that did not succeed, by outcome."""
     counts = collections.Counter(found["outcome"].values.ravel().tolist())
     return {name: counts[name] for name in OUTCOMES[1:] if counts[name]}
 
 
 def summary(found: xr.Dataset) -> str:
-    """A sweep in a few lines: lanes by label, lanes without a certain label, failures, accuracy."""
+    """Summary of a sweep in a few lines: lanes by label, uncertain labels, failures, accuracy."""
     labels: Shaped[np.ndarray, "*lanes"] = found["label"].values
     sizes = ", ".join(f"{n} {axis}{'s' * (n != 1)}" for axis, n in zip(found["label"].dims, labels.shape))
     rpm = found["rpm"].values

@@ -1,10 +1,10 @@
 """Zones and their edges, as found in a sweep.
 
-Two kinds of edge are never mixed. A **chaotic edge** is the end of a run of chaotic speeds, after windows narrower than
-a stated width are closed: it is statistical, and no more certain than the grid. Chaos that lasts beyond the horizon of
-the sweep and chaos that dies out before it make zones of their own; between these an edge is no more certain than the
-mean lives next to it, which may be on either side of the horizon within their errors. An **edge of an unstable range**
-is where the stable period-1 orbit appears or disappears; a sweep only brackets it between two neighbouring speeds.
+Two kinds of edge are distinguished. A **chaotic edge** is the end of a run of chaotic speeds, after windows narrower
+than a stated width are closed: it is statistical, with the resolution of the grid. Chaos that lasts beyond the horizon
+of the sweep and chaos that dies out before it form separate zones; an edge between these is as uncertain as the mean
+lives next to it, which may be on either side of the horizon within their errors. An **edge of an unstable range** is a
+speed at which the stable period-1 orbit appears or disappears; a sweep brackets it between two neighbouring speeds.
 """
 
 import dataclasses
@@ -21,12 +21,12 @@ from .sweep import chaotic_share, failed, lasting, resolution_rpm, restless, sur
 
 
 CLOSE_BELOW_RPM, CLOSE_BELOW = 500.0, 0.05
-"""Windows within a zone are closed below so many rpm, and below this part of the highest speed: large bearings turn
-slowly."""
+"""Width of the windows within a zone that are closed [rpm], and its limit as a fraction of the highest speed (large
+bearings turn slowly)."""
 
 
 def closing_width(rpm: np.ndarray) -> float:
-    """Width below which windows are closed [rpm], of speeds that are looked at."""
+    """Width below which windows between speeds `rpm` are closed [rpm]."""
     return min(CLOSE_BELOW_RPM, CLOSE_BELOW * float(np.max(rpm)))
 
 
@@ -37,12 +37,12 @@ class Edge:
     speed_rpm: float
     uncertainty_rpm: float
     kind: str
-    """`chaotic`, `transient` or `unstable`."""
+    """Kind of zone: `chaotic`, `transient` or `unstable`."""
     mechanism: str = "unknown"
-    """`period-doubling`, `Neimark-Sacker`, `fold` or `unknown`."""
+    """Mechanism: `period-doubling`, `Neimark-Sacker`, `fold` or `unknown`."""
     basis: str = "statistical"
-    """`statistical`: seen in a sweep; `located`: a bifurcation, solved for; `cascade`: the limit of a period-doubling
-    cascade, extrapolated from its first points."""
+    """Source: `statistical`, from a sweep; `located`, a bifurcation that was solved for; `cascade`, the extrapolated
+    limit of a period-doubling cascade."""
 
     def __str__(self) -> str:
         if self.basis == "statistical":
@@ -58,40 +58,39 @@ class MeanLife(NamedTuple):
     revolutions: float
     speed_rpm: float
     bound: bool
-    """Whether no start left chaos there: the life is longer, and how much is not known."""
+    """True if no trajectory left chaos there, so that `revolutions` is a lower bound."""
 
     @property
     def seconds(self) -> float:
-        """At its speed."""
+        """Mean life [s] at that speed."""
         return 60 * self.revolutions / self.speed_rpm
 
 
 def lives_in_words(lives: Sequence[MeanLife], value: Callable[[MeanLife], str]) -> str:
-    """The shortest and longest of them as `value` writes one, a lower bound with a sign."""
+    """Text with the shortest and the longest life, each formatted by `value`, with ">" before a lower bound."""
     signed = [("> " if life.bound else "") + value(life) for life in lives]
     return signed[0] if all(life.bound for life in lives) else " to ".join(dict.fromkeys(signed))
 
 
 @dataclasses.dataclass(frozen=True)
 class Zone:
-    """A range of speed; an edge is None where the zone runs past the swept range."""
+    """A range of speed; an edge is None if the zone extends beyond the swept range."""
 
     kind: str
-    """`chaotic`, `transient`, `unstable`, or `synchronous` for a stretch in which the stable period-1 orbit was
-    met."""
+    """Kind: `chaotic`, `transient`, `unstable`, or `synchronous`, in which the stable period-1 orbit was met."""
     onset: Edge | None
     exit: Edge | None
     share: float
-    """Mean over the zone's speeds of the share of initial states that are chaotic while observed; where the synchronous
-    orbit was met, that settled on it; where it was lost, that did not."""
+    """Mean over the zone's speeds of the fraction of initial states that are chaotic while observed; in a synchronous
+    zone, that settled on the orbit; in an unstable range, that did not."""
     life: tuple[MeanLife, MeanLife] | None = None
-    """Shortest and longest mean life of chaos at the zone's speeds, each from the initial states there and next to it.
-    Where none of them left chaos only a lower bound is known, which may be the longest, but the shortest only if
-    nothing else is known. None where lanes were not followed."""
+    """Shortest and longest mean life of chaos at the zone's speeds, each from the lanes there and at the neighbouring
+    speeds. Without an escape only a lower bound is known, which is the shortest only if all are lower bounds. None if
+    lanes were not followed."""
 
     @property
     def width_rpm(self) -> float | None:
-        """Exit less onset, None for an open zone."""
+        """Width [rpm], None for an open zone."""
         return None if self.onset is None or self.exit is None else self.exit.speed_rpm - self.onset.speed_rpm
 
 
@@ -100,15 +99,15 @@ class Zones:
     """Zones in the speed range of a sweep, at the resolution of its speeds."""
 
     zones: tuple[Zone, ...]
-    """Zones of chaos that lasts, ascending."""
+    """Zones of lasting chaos, ascending."""
     synchronous: tuple[Zone, ...]
-    """Stretches in which a stable period-1 orbit was met; their ends are edges of unstable ranges."""
+    """Ranges in which a stable period-1 orbit was met; their ends are edges of unstable ranges."""
     resolution_rpm: float
     close_below_rpm: float
     transient: tuple[Zone, ...] = ()
-    """Zones of chaos that dies out before the horizon, ascending; what lasts lies between them."""
+    """Zones of chaos that dies out before the horizon, ascending."""
     horizon: int = 0
-    """Revolutions that chaos must last; 0 if that was not asked."""
+    """Revolutions that chaos must last; 0 if lanes were not followed."""
 
     def __str__(self) -> str:
         lasting = f" of chaos that lasts beyond {self.horizon} revolutions" if self.horizon else ""
@@ -129,7 +128,7 @@ def _row(zone: Zone) -> str:
 
 
 def runs(mask: Bool[np.ndarray, " speeds"]) -> list[tuple[int, int]]:
-    """First and last index of each run of true values."""
+    """First and last index of each run of True values."""
     padded = np.concatenate([[False], mask, [False]]).astype(int)
     changes = np.diff(padded)
     return list(zip(np.flatnonzero(changes == 1).tolist(), (np.flatnonzero(changes == -1) - 1).tolist(), strict=True))
@@ -138,10 +137,7 @@ def runs(mask: Bool[np.ndarray, " speeds"]) -> list[tuple[int, int]]:
 def close_windows(
     rpm: np.ndarray, chaotic: Bool[np.ndarray, " speeds"], close_below_rpm: float
 ) -> list[tuple[int, int]]:
-    """Runs of chaotic speeds, joined where the window between them is narrower than `close_below_rpm`.
-
-    The width of a window is the distance between the chaotic speeds at its two sides.
-    """
+    """Runs of chaotic speeds, joined if the distance from the last to the next is less than `close_below_rpm`."""
     joined: list[tuple[int, int]] = []
     for first, last in runs(chaotic):
         if joined and rpm[first] - rpm[joined[-1][1]] < close_below_rpm * (1 - 1e-9):  # rounding of the grid
@@ -151,18 +147,18 @@ def close_windows(
 
 
 class _Speeds(NamedTuple):
-    """What is known at the speeds of a sweep about one kind of zone."""
+    """Classification of the speeds of a sweep for one kind of zone."""
 
     known: Bool[np.ndarray, " speeds"]
-    """Whether a speed is inside or outside; false for a gap."""
+    """True if it is known that a speed is inside or outside; False for a gap."""
     undecided: Bool[np.ndarray, " speeds"]
-    """Known, but the other is possible too."""
+    """True if the opposite is possible within the errors."""
     share: Float[np.ndarray, " speeds"]
-    """Share of the initial states that do what the zone is named for."""
+    """Fraction of the initial states that are chaotic, or periodic, as the kind of zone says."""
 
 
 def _edge(rpm: np.ndarray, at: _Speeds, inner: int, step: int, kind: str) -> Edge | None:
-    """The edge between the zone's end at `inner` and the first speed beyond it of which something is known."""
+    """Edge between the zone's end at `inner` and the first known speed beyond it."""
     outer = _first(at.known, inner + step, step)
     if not 0 <= outer < rpm.size:
         return None
@@ -173,7 +169,7 @@ def _edge(rpm: np.ndarray, at: _Speeds, inner: int, step: int, kind: str) -> Edg
 
 
 def _first(mask: Bool[np.ndarray, " speeds"], index: int, step: int) -> int:
-    """The first true value from `index` on, by steps; beyond the ends if there is none."""
+    """Index of the first True value from `index` on in direction `step`; outside the array without one."""
     while 0 <= index < mask.size and not mask[index]:
         index += step
     return index
@@ -196,7 +192,7 @@ def _zones(found: xr.Dataset, at: _Speeds, spans: Sequence[tuple[int, int]], kin
 
 
 def _life(found: xr.Dataset, chaotic: np.ndarray, first: int, last: int) -> tuple[MeanLife, MeanLife]:
-    """Shortest and longest mean life at the speeds of a zone at which there is chaos."""
+    """Shortest and longest mean life at the chaotic speeds of a zone."""
     at = {float(found["rpm"][i]): survival_at(found, i) for i in range(first, last + 1) if chaotic[i]}
     lives = [MeanLife(s.mean_life if s.escapes else s.lower_bound, rpm, not s.escapes) for rpm, s in at.items()]
     shortest = min(lives, key=lambda life: (life.bound, life.revolutions))
@@ -205,17 +201,18 @@ def _life(found: xr.Dataset, chaotic: np.ndarray, first: int, last: int) -> tupl
 
 
 def zones(sweep: xr.Dataset, close_below_rpm: float | None = None) -> Zones:
-    """Chaotic zones of a sweep, and the stretches in which the synchronous orbit was met.
+    """Chaotic zones of a sweep, and the ranges in which the synchronous orbit was met.
 
-    A speed counts as chaotic if any lane is and, where lanes were followed to a horizon, if the mean life of its chaos
-    is beyond that; else as transient. Where no lane is chaotic but some failed or were inaccurate, nothing is known:
-    such speeds are neither in a zone nor outside, and an edge next to them is as uncertain as their gap is wide.
+    A speed with at least one chaotic lane counts as transient if lanes were followed to a horizon that exceeds the mean
+    life of chaos, else as chaotic. Speeds without a chaotic lane at which some lanes failed or were inaccurate are
+    neither inside nor outside a zone, and the uncertainty of an edge next to them is the width of the gap.
 
-    **Arguments:** a sweep with at least one exponent; width of the windows to be closed [rpm], by default 500 rpm
-    and at most 5 % of the highest speed.
+    **Arguments:** a sweep with at least one exponent; width of the windows to be closed [rpm], by default 500 rpm and
+    at most 5 % of the highest speed.
 
-    **Returns:** `Zones`. Edges lie half way between neighbouring speeds, with the spacing as uncertainty, or the
-    distance to the first speed on either side at which the interval of the mean life (95 %) leaves the horizon out.
+    **Returns:** `Zones`. Edges lie half way between neighbouring speeds. Their uncertainty is the spacing or, if
+    larger, the distance to the first speed on either side at which the interval of the mean life (95 %) excludes the
+    horizon.
     """
     rpm, label = sweep["rpm"].values, sweep["label"].values
     close_below_rpm = closing_width(rpm) if close_below_rpm is None else close_below_rpm
@@ -234,8 +231,7 @@ def zones(sweep: xr.Dataset, close_below_rpm: float | None = None) -> Zones:
 
 
 def _undecided(found: xr.Dataset, chaotic: Bool[np.ndarray, " speeds"]) -> Bool[np.ndarray, " speeds"]:
-    """Speeds at which lanes left chaos after a mean life that may be on either side of the horizon, and calm speeds
-    with a lane that is undecided and may be chaotic within two standard errors."""
+    """True for speeds at which the mean life may be on either side of the horizon, or an undecided lane chaotic."""
     highest = (found["exponents"] + 2 * found["standard_error"]).values
     open_ = (found["label"].values == "undecided") & (highest > CHAOS_THRESHOLD)[..., 0]
     undecided = ~chaotic & np.any(open_, axis=1)
@@ -247,7 +243,7 @@ def _undecided(found: xr.Dataset, chaotic: Bool[np.ndarray, " speeds"]) -> Bool[
 
 
 SURE = 2.0
-"""Standard errors by which an exponent must be above zero to be called positive."""
+"""Number of standard errors by which an exponent must exceed zero to count as positive."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -255,23 +251,20 @@ class Stretch:
     """Neighbouring speeds of a sweep at which the lanes have the same labels."""
 
     labels: tuple[str, ...]
-    """Labels of the lanes: several where the initial state decides; `failed` where no lane came to its end."""
+    """Labels of the lanes, several if they depend on the initial state; `failed` if every lane failed."""
     chaotic: bool
     """True if the largest exponent, in the mean over lanes, is above 0 by more than two standard errors."""
     low_rpm: float
-    """Halfway between the last speed outside and the first inside, or the first speed of the sweep."""
+    """Lower end: halfway between the last speed outside and the first inside, or the first speed of the sweep."""
     high_rpm: float
     speeds: int
     exponent: float
-    """Mean over all lanes of the stretch."""
+    """Mean of the largest exponent per revolution over all lanes of the stretch."""
     exponent_error: float
 
 
 def stretches(sweep: xr.Dataset) -> tuple[Stretch, ...]:
-    """Stretches of speed with the same labels and an exponent that is positive throughout or nowhere, ascending.
-
-    Their ends are known to half the distance of the speeds of the sweep.
-    """
+    """Ascending stretches of speed with equal labels and sign of the exponent, accurate to half the spacing."""
     rpm, label = sweep["rpm"].values, sweep["label"].values
     kinds = [_kind(sweep, label, i) for i in range(rpm.size)]
     ends = [0, *(i for i in range(1, len(kinds)) if kinds[i] != kinds[i - 1]), len(kinds)]
@@ -289,14 +282,14 @@ def stretches(sweep: xr.Dataset) -> tuple[Stretch, ...]:
 
 
 def _kind(sweep: xr.Dataset, label: np.ndarray, i: int) -> tuple[tuple[str, ...], bool]:
-    """Labels at a speed, and True if it is chaotic."""
+    """Labels at a speed, and True if its exponent is positive."""
     labels = set(label[i].tolist())
     exponent, error = _exponent(sweep, slice(i, i + 1))
     return tuple(sorted(labels - {"failed"} or labels)), bool(exponent > SURE * error)
 
 
 def _exponent(sweep: xr.Dataset, speeds: slice) -> tuple[float, float]:
-    """Mean over all blocks of some speeds, and its standard error; NaN without any."""
+    """Mean of the largest exponent over all blocks of some speeds, and its standard error; NaN with fewer than two."""
     blocks = sweep["block_growth"].values[speeds][..., :1]
     known = blocks[np.isfinite(blocks)]
     if known.size < 2:

@@ -1,18 +1,18 @@
-"""Lanes: a plan and settings in, one data set out, on all cores.
+"""Runs of many lanes (trajectories) on all cores: from a plan and settings to one data set.
 
 | module     | responsibility                                                                  |
 |------------|---------------------------------------------------------------------------------|
-| `settings` | how long lanes run, what is computed of them, how exactly                       |
-| `plan`     | which lanes are run: designs, speeds, initial states                            |
-| `observe`  | lanes run and observed, their errors                                            |
-| `confirm`  | labels confirmed by finer steps                                                 |
-| `horizon`  | lanes followed until they settle                                                |
-| `run`      | plan and settings to data set; sweeps over speed                                |
-| `dataset`  | the data set with units, words and provenance; zarr                             |
+| `settings` | length, accuracy and results of a run                                           |
+| `plan`     | designs, speeds and initial states of the lanes                                 |
+| `observe`  | integration of lanes, with what is observed and its errors                      |
+| `confirm`  | confirmation of labels with smaller steps                                       |
+| `horizon`  | continuation of lanes until they settle                                         |
+| `run`      | from plan and settings to a data set; sweeps over speed                         |
+| `dataset`  | the data set with units, texts and provenance; zarr                             |
 | `ramps`    | run-up and run-down                                                             |
-| `grid`     | grids and samples of parameters, cut into chunks                                |
-| `study`    | lanes over any parameters, stored as they go; maps of labels                    |
-| `store`    | the zarr folder of a study, whole at any time                                   |
+| `grid`     | grids and samples of parameters, in chunks                                      |
+| `study`    | runs over any parameters, stored chunk by chunk; maps of labels                 |
+| `store`    | the zarr folder of a study, consistent at any time                              |
 """
 
 from .._arguments import check_layer

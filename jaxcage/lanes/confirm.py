@@ -1,10 +1,10 @@
-"""Labels are confirmed by finer steps before they are reported.
+"""Confirmation of labels with smaller steps, before they are reported.
 
-Run again, from the same initial states and with steps at most half as long, are all lanes that are neither periodic nor
-failed, their neighbours in speed, and a tenth of the periodic ones, since false calm is the dangerous error. A label
-that changes, or an exponent that moves by more than its error, is replaced by that of the finer steps, which is
-confirmed in turn. A chaotic transient may end in one run and not in the other: such changes say nothing of the steps,
-and how long transients last is a question of its own (`horizon`).
+All lanes that are neither periodic nor failed, their neighbours in speed, and a tenth of the periodic ones (to miss
+chaos is the dangerous error) are run again from the same initial states with steps at most half as long. A label that
+changes, or an exponent that moves by more than its error, is replaced by the new one, which is confirmed in turn. A
+chaotic transient may end in one run and not in the other; such a change is not an error of the steps (see `horizon` for
+the life of transients).
 """
 
 from collections.abc import Callable
@@ -15,9 +15,9 @@ from jaxtyping import Int, Shaped
 
 
 CONFIRMATIONS = 2
-"""Number of times that steps are refined where labels change."""
+"""Maximum number of times that steps are refined."""
 SHARE = 0.1
-"""Share of the periodic lanes that are confirmed without a cause."""
+"""Fraction of the periodic lanes, drawn at random, that are confirmed."""
 SEED = 0
 
 
@@ -29,21 +29,19 @@ class Labelled(NamedTuple):
     error: np.ndarray
 
     def at(self, lanes: np.ndarray) -> "Labelled":
-        """Some of them."""
         return Labelled(*(x[lanes] for x in self))
 
 
 def confirm(
     labelled: Labelled, shape: tuple[int, ...], again: Callable[[Int[np.ndarray, " some"], int], Labelled]
 ) -> list[tuple[int, int, int]]:
-    """Run the doubtful lanes again with finer and finer steps, as long as their labels change.
+    """Run the doubtful lanes again with smaller and smaller steps, as long as their labels or exponents change.
 
-    **Arguments:** labels of all lanes; how lanes are laid out, speeds and initial states last; `again(lanes, times)`
-    runs some of them with steps refined so many times, puts the results in place of those before, and returns their
-    labels.
+    **Arguments:** labels of all lanes; shape of their layout, with speeds and initial states last; `again(lanes,
+    times)`, which runs some of them with steps refined `times` times, replaces their results, and returns their labels.
 
-    **Returns:** of each round the number of lanes that were run again, that of labels that changed, and that of
-    exponents that moved by more than their error under the same label.
+    **Returns:** for each round the numbers of lanes run again, of labels that changed, and of exponents that moved by
+    more than their error under the same label.
     """
     rounds = []
     lanes = _doubtful(labelled.label.reshape(shape))
@@ -53,7 +51,7 @@ def confirm(
             break
         after = again(lanes, times)
         changed = before.label != after.label
-        apart = np.abs(before.exponent - after.exponent)  # NaN of a failed lane is not apart
+        apart = np.abs(before.exponent - after.exponent)  # NaN of a failed lane does not count as moved
         moved = ~changed & (apart > np.maximum(3 * np.hypot(before.error, after.error), 0.01))
         rounds.append((lanes.size, int(np.sum(changed)), int(np.sum(moved))))
         lanes, before = lanes[changed | moved], after.at(changed | moved)
@@ -61,7 +59,7 @@ def confirm(
 
 
 def _doubtful(label: Shaped[np.ndarray, "*designs speeds initial_states"]) -> Int[np.ndarray, " lanes"]:
-    """Lanes to be confirmed, by their place in the raveled labels."""
+    """Indices into the ravelled labels of the lanes to be confirmed."""
     failed = np.isin(label, ("failed", "inaccurate"))
     near = ~np.char.startswith(label, "periodic") & ~failed
     beside = near.copy()

@@ -1,17 +1,17 @@
-"""The data set of a run: lanes over the axes of their plan, with units, words and provenance; stored by zarr.
+"""The data set of a run: lanes over the axes of their plan, with units, texts and provenance; stored by zarr.
 
-Variables, over the axes of the plan (`speed` and `initial_state` of a sweep) and what stands in brackets:
+Variables, over the axes of the plan (`speed` and `initial_state` for a sweep) and the dimensions in brackets:
 
 | variable | contents |
 |---|---|
-| `label`, `outcome` | what a lane does, and how its integration ended; words, on disk codes with their meanings |
+| `label`, `outcome` | kind of motion, and how the integration ended; words, on disk codes with their meanings |
 | `exponents`, `standard_error` (exponent) | Lyapunov exponents per revolution |
-| `block_growth` (growth_block, exponent), `doubt` (exponent) | means of blocks, error that comes from the steps |
-| `peak`, `error`, `steps` | largest excursion, largest error of a revolution [scale], steps of a revolution |
-| `last`, `scale` (component) | state at the end, magnitude of each component |
-| `strobe` (revolution, component) | the last strobe states, where revolutions repeat |
-| `escape` | revolutions after which a lane is calm, where lanes were followed to a horizon |
-| quantities of the model, and `NAME_blocks` (block) | means and largest values, and those of each block |
+| `block_growth` (growth_block, exponent), `doubt` (exponent) | exponents of each block, integration error of the mean |
+| `peak`, `error`, `steps` | largest excursion, largest error of a revolution [scale], steps per revolution |
+| `last`, `scale` (component) | final state, characteristic magnitude of each component |
+| `strobe` (revolution, component) | last strobe states, for models whose revolutions repeat |
+| `escape` | revolutions after which a lane is calm, if lanes were followed to a horizon |
+| quantities of the model, and `NAME_blocks` (block) | means and largest values, also of each block |
 """
 
 import functools
@@ -37,12 +37,12 @@ from .settings import Run
 
 
 CODES: dict[str, tuple[str, ...]] = {"label": LABELS, "outcome": OUTCOMES}
-"""Variables that hold words, and the words in the order of their codes on disk; code -1 is a lane still to be run."""
+"""Variables that hold words, and the words in the order of their codes on disk; code -1 is a pending lane."""
 PENDING = "pending"
 
 
 def exponent_error(seen: Observation) -> Float[np.ndarray, "lanes exponents"]:
-    """Standard error of the exponents: scatter of the blocks, and the error of the steps."""
+    """Standard error of the exponents: scatter of the blocks combined with the integration error."""
     return np.hypot(scatter(seen.growth, axis=1), seen.doubt)
 
 
@@ -56,7 +56,7 @@ def dataset(
     escape: Float[np.ndarray, " lanes"] | None = None,
     horizon: int = 0,
 ) -> xr.Dataset:
-    """The lanes of a plan as a data set, with all that is known of them after their run."""
+    """Data set of the lanes of a plan from their observation, labels, confirmations and escape times."""
     model, last = plan.model, run.discard + run.revolutions
     if escape is not None:
         label = np.where((label == "chaotic") & np.isfinite(escape), "transient", label)
@@ -102,7 +102,7 @@ def dataset(
 
 
 def _coordinates(plan: Plan) -> dict[str, Any]:
-    """Values along the axes, speeds in revolutions per minute, and the speed that goes with the model's."""
+    """Values along the axes, speeds also in rpm, and the model's other speed (of the shaft or of the cage) in rpm."""
     model = plan.model
     found: dict[str, Any] = dict(plan.coordinates)
     if SPEED not in found:
@@ -119,7 +119,7 @@ def _coordinates(plan: Plan) -> dict[str, Any]:
 
 
 def configuration_of(model: AbstractForcedSystem) -> dict[str, str]:
-    """The TOML configuration of a model as an attribute, a nested mapping in JSON; none where no file can hold it."""
+    """Attribute with the configuration of a model, as in TOML, in JSON; empty if no file can represent the model."""
     try:
         return {"configuration": json.dumps(configuration(model))}
     except InputError:
@@ -132,19 +132,19 @@ def _versions() -> dict[str, str]:
 
 
 def settings_of(method: AbstractMethod) -> dict[str, str]:
-    """Method and versions of the packages, by which a result can be reproduced."""
+    """Method and versions of the packages, for reproducing a result."""
     return {"method": str(method).replace("\n", " "), **_versions()}
 
 
 def flags(words: Sequence[str]) -> dict[str, Any]:
-    """Attributes of a variable that holds codes, with their meanings in the way of the CF conventions; none without."""
+    """Attributes of a variable of codes with their meanings, by the CF conventions; empty without words."""
     if not words:
         return {}
     return {"flag_values": [-1, *range(len(words))], "flag_meanings": " ".join([PENDING, *words])}
 
 
 def coded(found: xr.Dataset) -> xr.Dataset:
-    """The data set with codes in place of words."""
+    """Replace words by codes."""
     for name in CODES.keys() & found.data_vars.keys():
         codes = np.full(found[name].shape, -1, dtype=np.int8)
         for code, word in enumerate(CODES[name]):
@@ -154,7 +154,7 @@ def coded(found: xr.Dataset) -> xr.Dataset:
 
 
 def decoded(found: xr.Dataset) -> xr.Dataset:
-    """The data set with words in place of codes."""
+    """Replace codes by words."""
     for name in CODES.keys() & found.data_vars.keys():
         attributes = dict(found[name].attrs)
         if words := attributes.pop("flag_meanings", ""):
@@ -164,22 +164,22 @@ def decoded(found: xr.Dataset) -> xr.Dataset:
 
 
 def save(path: str | Path, found: xr.Dataset) -> Path:
-    """Write a data set to the zarr folder `path`, whole or not at all; an earlier result stays until then."""
+    """Write a data set to the zarr folder `path` atomically; an earlier one is kept if this fails."""
     with replacing(path) as temporary:
         coded(found).to_zarr(temporary, mode="w", consolidated=False)
     return Path(path)
 
 
 def load(path: str | Path) -> xr.Dataset:
-    """The data set that `save` wrote, in memory. **Raises:** `FileNotFoundError`."""
+    """Read a data set written by `save` into memory. **Raises:** `FileNotFoundError`."""
     if not Path(path).is_dir():
         raise FileNotFoundError(f"There is no stored run at '{path}'.")
-    # Version 3 only, which `save` writes: version 2 has a codec that unpickles, and so runs what a file says.
+    # Only version 3, which `save` writes: version 2 has a codec that unpickles, and so may execute code from a file.
     with xr.open_dataset(path, engine="zarr", zarr_format=3, consolidated=False, chunks=None) as stored:
         return decoded(stored.load())
 
 
 def stored_configuration(found: xr.Dataset) -> Mapping[str, Any] | None:
-    """The configuration of the model that made a data set; None if there was none."""
+    """Configuration of the model of a data set; None if it has none."""
     text = found.attrs.get("configuration")
     return None if text is None else json.loads(text)

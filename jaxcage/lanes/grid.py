@@ -1,7 +1,7 @@
-"""Grids and samples of parameters, whose lanes are cut into chunks.
+"""Grids and samples of parameters, whose lanes are divided into chunks.
 
-A lane is one sample, one value on each axis of the grid, and one initial state. Its numbers follow from the grid and
-its place alone, so that any process can compute any chunk at any time, and gets the same bits.
+A lane is one sample, one value on each axis of the grid, and one initial state. Its numbers depend only on the grid and
+its index, so that any process can compute any chunk at any time with identical bits.
 """
 
 import dataclasses
@@ -27,12 +27,12 @@ from .plan import SPEED, START, Plan, own_states
 
 SAMPLE = "sample"
 OIL = "oil"
-"""Name of the ISO VG grade of a mineral oil beside those of the model's parameters."""
+"""Name of the ISO VG grade of a mineral oil, besides the names of the model's parameters."""
 LANES = 2048
-"""Lanes of a chunk, at most: some seconds of work, which is what is lost with a process that is killed."""
+"""Maximum number of lanes per chunk: a few seconds of work, which are lost if a process is killed."""
 
 Values = dict[str, Float[np.ndarray, " lanes"]]
-"""Parameter by name -> its value in each lane [SI]."""
+"""Mapping of parameter names to the value in each lane [SI]."""
 
 
 def sobol(unknowns: int, draws: int, seed: int | np.random.Generator) -> Float[np.ndarray, "draws unknowns"]:
@@ -43,18 +43,18 @@ def sobol(unknowns: int, draws: int, seed: int | np.random.Generator) -> Float[n
 
 
 SIGMAS = 3.0
-"""Standard deviations from the nominal value to either end of a tolerance, as in a capable production."""
+"""Number of standard deviations from the nominal value to either end of a tolerance, for a capable process."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Between:
-    """Values of a parameter between two bounds, each as likely as any other; or of a tolerance, `normal` around its
-    middle with its ends at `SIGMAS` standard deviations, and what lies outside sorted out."""
+    """Distribution of a parameter between two bounds: uniform or, if `normal`, truncated normal with the bounds at
+    `SIGMAS` standard deviations, as for a tolerance."""
 
     lower: float
-    """[SI]."""
+    """Lower bound [SI]."""
     upper: float
-    """[SI]."""
+    """Upper bound [SI]."""
     normal: bool = False
 
     def __post_init__(self):
@@ -65,11 +65,11 @@ class Between:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Smallest and largest value [SI]."""
+        """Lower and upper bound [SI]."""
         return self.lower, self.upper
 
     def at(self, place: Float[np.ndarray, " samples"]) -> Float[np.ndarray, " samples"]:
-        """Values [SI] below which the shares `place` of all values lie."""
+        """Quantiles [SI] at the probabilities `place`."""
         if not self.normal:
             return self.lower + place * (self.upper - self.lower)
         from scipy.stats import truncnorm  # takes half a second to load
@@ -80,18 +80,18 @@ class Between:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Grid:
-    """Samples x axes x initial states, in chunks that are blocks of this grid."""
+    """Grid of samples x values x initial states, divided into chunks that are blocks of the grid."""
 
     values: Mapping[str, Float[np.ndarray, " values"]]
-    """Parameter -> its values [SI], one axis each."""
+    """Values [SI] by parameter, one axis each."""
     sampled: Mapping[str, Between]
-    """Parameter -> how it is sampled; all of them together are one axis."""
+    """Distributions by parameter; all of them together form one axis."""
     samples: int
     seed: int
-    """Of the scrambled Sobol sequence."""
+    """Seed of the scrambled Sobol sequence."""
     initial_states: int
     lanes: int = LANES
-    """Lanes of a chunk, at most."""
+    """Maximum number of lanes per chunk."""
 
     def __post_init__(self):
         if SPEED not in self.names:
@@ -116,28 +116,28 @@ class Grid:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Everything that is varied."""
+        """Names of all parameters that vary."""
         return (*self.sampled, *self.values)
 
     @property
     def axes(self) -> dict[str, int]:
-        """Length of each axis by name, the slowest first."""
+        """Length of each axis by name, slowest first."""
         sample = {SAMPLE: self.samples} if self.sampled else {}
         return {**sample, **{name: len(values) for name, values in self.values.items()}, START: self.initial_states}
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Lanes along each axis."""
+        """Number of lanes along each axis."""
         return tuple(self.axes.values())
 
     @property
     def size(self) -> int:
-        """Lanes in all."""
+        """Total number of lanes."""
         return math.prod(self.shape)
 
     @functools.cached_property
     def cloud(self) -> dict[str, Float[np.ndarray, " samples"]]:
-        """The samples [SI]: scrambled Sobol points, taken through the distribution of each parameter."""
+        """Samples [SI]: scrambled Sobol points, transformed to the distribution of each parameter."""
         if not self.sampled:
             return {}
         places = sobol(len(self.sampled), self.samples, self.seed)
@@ -145,7 +145,7 @@ class Grid:
 
     @functools.cached_property
     def block(self) -> tuple[int, ...]:
-        """Extent of a chunk along each axis: the fastest axes whole, the next in equal parts that there is room for."""
+        """Extent of a chunk along each axis: the fastest axes whole, the next in equal parts within `lanes`."""
         room, extents = self.lanes, []
         for length in reversed(self.shape):
             parts = -(-length // max(room, 1))
@@ -164,24 +164,24 @@ class Grid:
         return math.prod(self.blocks)
 
     def region(self, chunk: int) -> tuple[slice, ...]:
-        """Where a chunk lies in the grid."""
+        """Slices of the grid that a chunk covers."""
         place = np.unravel_index(chunk, self.blocks)
         corners = zip(place, self.block, self.shape, strict=True)
         return tuple(slice(int(i) * extent, min((int(i) + 1) * extent, length)) for i, extent, length in corners)
 
     def lanes_of(self, chunk: int) -> Int[np.ndarray, " lanes"]:
-        """Numbers of the lanes of a chunk, counted through the grid."""
+        """Indices of the lanes of a chunk in the ravelled grid."""
         within = np.ix_(*(np.arange(part.start, part.stop) for part in self.region(chunk)))
         return np.ravel_multi_index(within, self.shape).ravel()
 
     def at(self, lane: Int[np.ndarray, " lanes"]) -> tuple[Values, Int[np.ndarray, " lanes"]]:
-        """What each lane has: the value of every varied parameter, and the number of its start."""
+        """Values of every varied parameter, and the index of the initial state, for each lane."""
         place = dict(zip(self.axes, np.unravel_index(lane, self.shape), strict=True))
         sampled = {name: values[place[SAMPLE]] for name, values in self.cloud.items()}
         return {**sampled, **{name: values[place[name]] for name, values in self.values.items()}}, place[START]
 
     def require_known(self, model: AbstractForcedSystem) -> None:
-        """**Raises:** `ValueError` for a parameter that the model does not have, or more initial states than it has."""
+        """Raise `ValueError` for a parameter that the model does not have, or more initial states than it has."""
         for name in self.names:
             if name not in (SPEED, OIL):
                 pick(model, name)
@@ -191,7 +191,7 @@ class Grid:
             raise ArgumentError("initial_states", said=f"must be at most {own}, but {self.initial_states} was given.")
 
     def plan(self, model: AbstractForcedSystem, lanes: Int[np.ndarray, " lanes"] | None = None) -> Plan:
-        """Some lanes of a model, on one axis `lane`; or all of them, over the axes of the grid."""
+        """Plan of some lanes of a model, on one axis `lane`, or of all, over the axes of the grid."""
         some = np.arange(self.size) if lanes is None else lanes
         values, start = self.at(some)
         speed = values.pop(SPEED)
@@ -207,7 +207,7 @@ class Grid:
         return Plan(chosen, states, self.axes, {name: ((name,), np.asarray(x)) for name, x in self.values.items()})
 
     def describe(self) -> dict[str, Any]:
-        """Everything that the lanes follow from, by which a store is recognised."""
+        """Description that determines the lanes, by which a store recognises its study."""
         return {
             "grid": {name: _summary(values) for name, values in self.values.items()},
             "sampled": {name: repr(spread) for name, spread in self.sampled.items()},
@@ -220,13 +220,13 @@ class Grid:
 
 
 def _summary(values: np.ndarray) -> list[Any]:
-    """Count, ends and a digest of every bit."""
+    """Count, first and last value, and a hash of all."""
     exact = np.ascontiguousarray(values, dtype="<f8")
     return [exact.size, float(exact[0]), float(exact[-1]), hashlib.sha256(exact.tobytes()).hexdigest()[:16]]
 
 
 def with_values(model: Any, values: Mapping[str, Any]) -> Any:
-    """The model with parameters set by name; `oil` makes the lubricant a mineral oil of that grade."""
+    """Model with parameters set by name; `oil` makes the lubricant a mineral oil of that ISO VG grade."""
     for name, value in values.items():
         if name == OIL:
             model = eqx.tree_at(lambda m: m.lubricant, model, vg(value, model.lubricant.temperature))

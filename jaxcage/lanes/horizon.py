@@ -1,6 +1,6 @@
-"""Lanes that have not settled are followed to a horizon, which tells how long their chaos lasts.
+"""Continuation of lanes that have not settled, up to a horizon, to find out how long their chaos lasts.
 
-Some leave chaos for good before the horizon: they were on a chaotic transient, whose mean life follows from the times
+Lanes that leave chaos for good before the horizon were on a chaotic transient, whose mean life follows from the times
 of these escapes (`analysis.survival`). Lanes that settle early can also be stopped early.
 """
 
@@ -25,11 +25,11 @@ from .settings import Run
 
 
 STAGE = 12
-"""Number of blocks after which lanes that have settled are not run any further."""
+"""Number of blocks between two checks for lanes that have settled."""
 CALM = -1.0
-"""Growth that stands for that of a lane which has settled on a periodic orbit, and is not followed."""
+"""Placeholder for the growth of a lane that has settled and is not run any further."""
 Onward = Callable[[Run, Int[np.ndarray, " some"], Float[np.ndarray, "some dim"] | None], Observation]
-"""Runs some lanes with some settings: from given states, or from their initial states."""
+"""Function that runs some lanes with given settings, from given states or from their initial states."""
 
 
 def follow(
@@ -39,21 +39,20 @@ def follow(
     scale: Float[np.ndarray, "lanes dim"],
     onward: Onward,
 ) -> tuple[Float[np.ndarray, " lanes"], int]:
-    """Follow the lanes that are not settled, and put their later states in place of what was `seen` of them.
+    """Follow the chaotic and undecided lanes, and update their last states and errors in `seen`.
 
-    They are run on in stages of `STAGE` blocks. A lane that has closed on a periodic orbit by the end of a stage, its
-    growth calm for as long as an escape takes to be confirmed, is not run any further; nor is one that was undecided
-    and is seen to be on a torus. Exponents of lanes that were undecided are those of the longer run.
+    Lanes are run in stages of `STAGE` blocks. At the end of a stage those that are closed and have been calm for
+    `CONFIRM` blocks are stopped, and undecided ones that are now on a torus. The exponents of lanes that were undecided
+    are replaced by those of the longer run.
 
-    **Arguments:** labels; observations and the settings that they were made with; scale of each lane's state; what runs
-    lanes on.
+    **Arguments:** labels; observations and their settings; scale of each lane's state; function that runs lanes.
 
     **Returns:** revolutions of the whole run after which a lane is calm, infinity for chaos at the horizon, NaN for a
     failure; the horizon, in whole blocks.
     """
     early = _coarse(seen.growth[:, :, 0], run.block)
     observed = run.discard + run.revolutions
-    blocks = -(-(run.horizon - observed) // LIFE_BLOCK) + CONFIRM  # to the horizon, and those that confirm an escape
+    blocks = -(-(run.horizon - observed) // LIFE_BLOCK) + CONFIRM  # up to the horizon, and to confirm an escape
     late, ran = np.full((label.size, blocks), CALM), np.zeros(label.size, dtype=int)
     undecided = label == "undecided"
     calm = np.ones(label.size, dtype=bool)
@@ -86,8 +85,7 @@ def follow(
 
 
 def _aligned(late: Float[np.ndarray, "lanes ran"], count: int) -> Float[np.ndarray, "lanes parts"]:
-    """Growth in `count` equal parts of the run, the first block of each stage left out: tangent vectors still turn to
-    their direction there. Empty where there are fewer blocks."""
+    """Growth in `count` equal parts, without the first block of each stage, in which tangent vectors still align."""
     blocks = late[:, np.arange(late.shape[1]) % STAGE > 0]
     size = blocks.shape[1] // count
     if size == 0:
@@ -98,8 +96,7 @@ def _aligned(late: Float[np.ndarray, "lanes ran"], count: int) -> Float[np.ndarr
 def _put(
     seen: Observation, lanes: Int[np.ndarray, " some"], new: Observation, open_: Bool[np.ndarray, " some"]
 ) -> None:
-    """Put the later states in place, NaN where a lane fails; and the last strobe states of those that are `open_`,
-    which may close."""
+    """Update `seen` by later states, with NaN where a lane fails, and by strobe states for lanes that are `open_`."""
     seen.last[lanes], seen.outcome[lanes] = new.last, new.outcome
     seen.error[lanes] = np.fmax(seen.error[lanes], new.error)
     every = np.concatenate([seen.strobe[lanes[open_]], new.strobe[open_]], axis=1)
@@ -109,15 +106,15 @@ def _put(
 
 
 def _coarse(growth: Float[np.ndarray, "lanes blocks"], block: int) -> Float[np.ndarray, "lanes coarse"]:
-    """Mean growth over whole blocks of `LIFE_BLOCK` revolutions, the last ones of those observed."""
+    """Mean growth over as many whole blocks of `LIFE_BLOCK` revolutions as fit in those observed, the last ones."""
     every = np.repeat(growth, block, axis=1)
     count = every.shape[1] // LIFE_BLOCK
     return every[:, every.shape[1] - count * LIFE_BLOCK :].reshape(len(growth), count, LIFE_BLOCK).mean(axis=2)
 
 
 def run_unsettled(run: Run, scale: Float[np.ndarray, "lanes dim"], onward: Onward) -> Observation:
-    """Observe lanes, of which those that are periodic after `run.settled` revolutions, or after all that are discarded,
-    are not run any further, nor with tangent vectors: their exponents are NaN."""
+    """Observe lanes, but stop those that are periodic after `run.settled` revolutions, or after all that are discarded,
+    before tangent vectors are followed: their exponents are NaN."""
     lanes, seen, done = np.arange(len(scale)), None, 0
     for until in sorted({run.settled, run.discard}):
         short = min(run.keep, until - done)
@@ -143,5 +140,5 @@ def run_unsettled(run: Run, scale: Float[np.ndarray, "lanes dim"], onward: Onwar
 
 
 def _later(seen: Observation, lanes: np.ndarray, new: Observation) -> None:
-    """Put what some lanes did later in place of what was seen of them; their error is the largest of both."""
+    """Replace the results of some lanes by later ones; the error is the larger one of both."""
     seen.put(lanes, new._replace(error=np.fmax(seen.error[lanes], new.error)))

@@ -1,7 +1,7 @@
-"""Lanes are run and observed: strobe states, growth of tangent vectors, integrals of quantities, errors.
+"""Integration of lanes with observations: strobe states, growth of tangent vectors, integrals of quantities, errors.
 
-Every lane runs by itself: what it does depends neither on its neighbours nor on the number of threads. Arrays have the
-lanes first.
+The results of a lane depend neither on the other lanes nor on the number of threads. Lanes are the first axis of all
+arrays.
 """
 
 import dataclasses
@@ -37,22 +37,22 @@ from .settings import Run
 
 
 CHECKED = 8
-"""Revolutions of each lane, the last ones whose strobe states are kept, that are run again to measure their error."""
+"""Number of revolutions at the end of each lane that are run again to measure their error."""
 FURTHER = 4
-"""Revolutions beyond the end of a run by which the error of its exponents is measured."""
+"""Number of revolutions beyond the end of a run for measuring the error of its exponents."""
 CHUNK = 4096
-"""Strobe states of a revolution, of all lanes together, that are held at a time."""
+"""Number of lanes run at a time; an eighth for models with several samples per revolution."""
 LEAD = 10
-"""Revolutions in which a tangent vector turns to its direction, where exponents are followed for a part of the run."""
+"""Number of revolutions in which tangent vectors align, if exponents are followed for a part of the run."""
 Progress = Callable[[int, int], None]
-"""Called with lanes done and lanes in all."""
+"""Function called with the numbers of finished lanes and of all lanes."""
 
 
 class Observation(NamedTuple):
-    """What lanes did. A lane that failed is NaN with an outcome."""
+    """Results of lanes; those of a lane that failed are NaN, with an outcome."""
 
     outcome: Int[np.ndarray, " lanes"]
-    """Code of how each lane ended, its place in `OUTCOMES`."""
+    """Index into `OUTCOMES` of how each lane ended."""
     last: Float[np.ndarray, "lanes dim"]
     """State at the end of the run [SI]."""
     strobe: Float[np.ndarray, "lanes keep dim"]
@@ -64,23 +64,23 @@ class Observation(NamedTuple):
     error: Float[np.ndarray, " lanes"]
     """Largest error of a revolution, in units of the scale."""
     doubt: Float[np.ndarray, "lanes exponents"]
-    """Error of the exponents that comes from the steps."""
+    """Integration error of the exponents per revolution."""
     steps: Float[np.ndarray, " lanes"]
     """Mean number of steps in an observed revolution."""
     integrals: Float[np.ndarray, "lanes blocks beside"]
-    """Integrals over each block of what the model integrates beside its state."""
+    """Integrals over each block of the model's additional integrands."""
     largest: Float[np.ndarray, "lanes blocks watched"]
-    """Largest values in each block of what the model watches, beyond the excursion."""
+    """Maximum in each block of the quantities that the model watches, without the excursion."""
     place: Float[np.ndarray, "lanes samples 2"]
-    """Centre of the cage from that of its land, over the clearance, at each sample; for models that record several."""
+    """Position of the cage centre relative to its land, over the clearance, at each sample; only for models with
+    averages."""
 
     def put(self, lanes: Int[np.ndarray, " some"], new: "Observation") -> None:
-        """Put what some lanes did in another run in place of what they did in this one."""
+        """Replace the results of some lanes."""
         for mine, theirs in zip(self, new, strict=True):
             mine[lanes] = theirs
 
     def at(self, lanes: Any) -> "Observation":
-        """Some of the lanes."""
         return Observation(*(x[lanes] for x in self))
 
 
@@ -93,11 +93,11 @@ def observe(
     method: AbstractMethod | None = None,
     onward: bool = False,
 ) -> Observation:
-    """Run lanes from their initial states.
+    """Run lanes from given states.
 
-    **Arguments:** lanes; settings; states [SI]; called with lanes done and lanes in all; method, by default that of the
-    settings; whether lanes go on from where another run left them, where they may be as far out as lanes come on their
-    way.
+    **Arguments:** lanes; settings; states [SI]; function that reports progress; method, by default that of the
+    settings; `onward`, True if the states are those at the end of another run, which may be farther out than initial
+    states.
     """
     count, each = lanes.speed.size, max(run.discard + run.revolutions, 1)
     chosen, limit = run.method if method is None else method, ESCAPE if onward else 1.0
@@ -114,10 +114,10 @@ def observe(
 
 
 def _allowed(observer: "_Observer", method: AbstractMethod) -> Observation:
-    """Observe lanes; those with too large an error again with smaller tolerances, and those that take too many or too
-    short steps again by an implicit method."""
+    """Observe lanes; repeat those with too large an error with smaller tolerances, and those with too many or too short
+    steps by an implicit method."""
     seen = observer.once(method, np.arange(observer.lanes.speed.size))
-    large = lambda: (seen.error > method.allowed) & (seen.outcome == 0)  # of what was asked for, not of a finer run
+    large = lambda: (seen.error > method.allowed) & (seen.outcome == 0)  # `allowed` of the method requested
 
     def again(chosen: AbstractMethod, lanes: np.ndarray) -> None:
         if np.any(lanes):
@@ -132,7 +132,7 @@ def _allowed(observer: "_Observer", method: AbstractMethod) -> Observation:
                 again(chosen.finer(retry), large())
     seen.outcome[large()] = INACCURATE
     lost = seen.outcome != 0
-    if observer.averages:  # means of a lane that is inaccurate are reported, with its error
+    if observer.averages:  # the means of inaccurate lanes are reported, with their error
         lost &= seen.outcome != INACCURATE
     for values in (seen.strobe, seen.growth, seen.last, seen.integrals, seen.largest, seen.place):
         values[lost] = np.nan
@@ -141,23 +141,23 @@ def _allowed(observer: "_Observer", method: AbstractMethod) -> Observation:
 
 @dataclasses.dataclass
 class _Observer:
-    """Some lanes, and how they are observed."""
+    """Lanes with their settings and initial states."""
 
     lanes: Lanes
     run: Run
     states: Float[np.ndarray, "lanes dim"]
     limit: float
-    """Largest excursion from which a lane may start."""
+    """Largest excursion of an initial state."""
     report: Callable[[float], None]
     done: int = 0
-    """Revolutions of all lanes together."""
+    """Number of revolutions done, summed over lanes."""
 
     def __post_init__(self):
         self.model = self.lanes.system
         self.averages = len(self.model.beside) > 0
 
     def _segments(self) -> list[tuple[int, int, bool]]:
-        """First and last revolution of each part of the run, and whether tangent vectors are followed in it."""
+        """First and last revolution of each part of the run, and True if tangent vectors are followed in it."""
         run, end = self.run, self.run.discard + self.run.revolutions
         pushed = end
         if run.exponents:
@@ -239,8 +239,8 @@ class _Observer:
     def _doubt(
         engine: Engine | JaxEngine, numbers: Any, ran: March, method: AbstractMethod
     ) -> Float[np.ndarray, "some exponents"]:
-        """Error of the exponents per revolution that comes from the steps: three times the change of the mean growth
-        over a few further revolutions by the method's reference."""
+        """Integration error of the exponents per revolution: three times the difference of the mean growth over a few
+        further revolutions from that by the method's reference."""
         if not ran.tangents.shape[1]:
             return np.zeros((len(ran.state), 0))
         options: dict[str, Any] = dict(tangents=ran.tangents, step=ran.step, threads=cores())
@@ -254,11 +254,11 @@ class _Observer:
         states: Float[np.ndarray, "some held numbers"],
         method: AbstractMethod,
     ) -> Float[np.ndarray, " some"]:
-        """Largest error of the stretches between states: three times the distance of the end of each from that by the
-        method's reference.
+        """Largest error of the stretches between states: three times the distance of their ends from those by the
+        method's reference, and at least the tolerance, which protects against accidental agreement.
 
-        It is at least the tolerance, which protects against accidental agreement of the two. A stretch is a revolution,
-        or as much of one as two runs can be compared over; of a single state it is the one that follows.
+        A stretch is a revolution, or as much of one as two runs can be compared over; for a single state it is the
+        stretch that follows.
         """
         numbers, more = self.lanes.numbers(engine, some), {}
         if self.averages:
@@ -273,7 +273,7 @@ class _Observer:
 def centres_of(
     model: AbstractForcedSystem, speed: Float[np.ndarray, " n"], states: Float[np.ndarray, "n dim"]
 ) -> Float[np.ndarray, "n 2"]:
-    """Centre of the cage from that of its land, over the clearance, at states of a model."""
+    """Position of the cage centre relative to its land, over the clearance, at states of a model."""
     return Lanes.of([model], speed).each(_centres, np.arange(speed.size), states[:, None])[:, 0]
 
 
@@ -282,6 +282,6 @@ def _centres(model: Any, speed: Array, states: Array) -> Array:
 
 
 def start_tangents(dimension: int, exponents: int) -> Float[np.ndarray, "exponents dim"]:
-    """Orthonormal directions with no component zero, so that none is orthogonal to a coordinate axis."""
+    """Orthonormal initial tangent vectors without zero components, so that none is orthogonal to a coordinate axis."""
     i, d = np.arange(exponents)[:, None], np.arange(dimension)
     return np.linalg.qr(np.cos((i + 1.0) * (d + 1) * 1.234 + d).T)[0].T

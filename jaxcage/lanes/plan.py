@@ -1,4 +1,4 @@
-"""Plans: which lanes are run, each a design at a speed from an initial state, and how they are laid out."""
+"""Plans of lanes: the design, speed and initial state of each, and their layout over axes."""
 
 import dataclasses
 import math
@@ -18,7 +18,7 @@ from ..solve import Lanes
 
 Speeds = float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"]
 States = int | Sequence[Any] | Float[np.ndarray, "speeds states dim"] | None
-"""Initial states: how many of the model's own, states for every speed, or states of each speed; all of its own."""
+"""Initial states: number of the model's own (None for all), states used at every speed, or states for each speed."""
 DESIGN, SPEED, START = "design", "speed", "initial_state"
 
 
@@ -27,7 +27,7 @@ def rpm(first: float | int) -> float: ...
 @overload
 def rpm(first: float | int, last: float | int, count: int = 2) -> Float[np.ndarray, " count"]: ...
 def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> float | Float[np.ndarray, " count"]:
-    """Speeds given in revolutions per minute, in rad/s: one number, or an array of `count` from `first` to `last`.
+    """Convert speeds from rpm to rad/s: one number, or an array of `count` from `first` to `last`.
 
     **Raises:** `ValueError` for anything but finite numbers, and for a count below 1.
     """
@@ -44,16 +44,16 @@ def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Plan:
-    """Lanes, and the axes along which they are laid out."""
+    """Lanes and their layout over axes."""
 
     lanes: Lanes
     """Design and speed of each lane."""
     states: Float[np.ndarray, "lanes dim"]
     """Initial state of each lane [SI]."""
     axes: Mapping[str, int]
-    """Length of each axis, the slowest first; their product is the number of lanes."""
+    """Length of each axis, slowest first; their product is the number of lanes."""
     coordinates: Mapping[str, tuple[tuple[str, ...], np.ndarray]] = dataclasses.field(default_factory=dict)
-    """Values along the axes by name: the axes of each, and values [SI]."""
+    """Axes and values [SI] of each coordinate."""
 
     @property
     def model(self) -> AbstractForcedSystem:
@@ -62,14 +62,14 @@ class Plan:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Lanes along each axis."""
+        """Number of lanes along each axis."""
         return tuple(self.axes.values())
 
     @classmethod
     def over_speed(
         cls, designs: AbstractForcedSystem | Sequence[AbstractForcedSystem], speeds: Speeds, states: States = None
     ) -> "Plan":
-        """Designs at speeds from initial states: axes `design` (of several), `speed` and `start`.
+        """Plan of designs at speeds from initial states: axes `design` (if several), `speed` and `initial_state`.
 
         **Arguments:** a model, or several that differ in their numbers only; ascending speeds [rad/s]; initial states.
 
@@ -88,7 +88,7 @@ class Plan:
 
     @classmethod
     def one_speed_each(cls, designs: Sequence[AbstractForcedSystem], speeds: Float[np.ndarray, " designs"]) -> "Plan":
-        """Designs, each at a speed of its own [rad/s], from all of their initial states: axes `design` and `start`."""
+        """Plan of designs, each at its own speed [rad/s], from all their initial states (axes as in `over_speed`)."""
         models = _models(designs)
         begin = np.stack([states_at(m, s, None)[0] for m, s in zip(models, speeds[:, None], strict=True)])
         count, initial_states, _ = begin.shape
@@ -103,7 +103,7 @@ class Plan:
 
 
 def checked_speeds(speeds: Any) -> Float[np.ndarray, " speeds"]:
-    """Speeds as an array. **Raises:** `ValueError` for speeds that are empty, not positive or not ascending."""
+    """Speeds as an array. **Raises:** `ValueError` for speeds that are empty, not positive, or not ascending."""
     speed = np.atleast_1d(np.asarray(speeds, dtype=float))
     if speed.size == 0:
         raise ArgumentError("speeds", said="must hold at least one speed, but it is empty.")
@@ -125,7 +125,7 @@ def _models(designs: AbstractForcedSystem | Sequence[AbstractForcedSystem]) -> l
 def states_at(
     model: AbstractForcedSystem, speed: Float[np.ndarray, " speeds"], states: States
 ) -> Float[np.ndarray, "speeds states dim"]:
-    """Initial states at each speed: the model's own, some of them, the same at every speed, or as given."""
+    """Initial states at each speed: all or some of the model's own, or the given ones."""
     if states is None or isinstance(states, int):
         own = Lanes.of([model], speed).each(own_states, np.arange(speed.size))
         if states is not None and not 1 <= states <= own.shape[1]:
@@ -148,6 +148,6 @@ def states_at(
 
 
 def own_states(model: AbstractForcedSystem, speed: Any) -> Float[Array, "states dim"]:
-    """Initial states that the model has at a speed."""
+    """The model's own initial states at a speed."""
     row = lambda y: jnp.stack([jnp.asarray(c, dtype=float) for c in y])
     return jnp.stack([row(y) for y in model.initial_states(speed)])

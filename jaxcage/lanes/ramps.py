@@ -1,4 +1,4 @@
-"""Run-up and run-down: true ramps of the speed, with the size of the motion on the way."""
+"""Run-up and run-down: continuous ramps of the speed, with the size of the motion along them."""
 
 import math
 
@@ -15,19 +15,19 @@ from .observe import centres_of
 
 
 SAMPLES = 32
-"""Phases of a revolution at which the motion is read."""
+"""Number of samples per revolution."""
 SETTLE = 100
-"""Revolutions at the first speed before a ramp begins."""
+"""Number of revolutions at the first speed before a ramp begins."""
 SURE = 3.0
-"""Multiple of the scatter within the windows from which a difference between up and down counts."""
+"""Smallest difference between up and down that counts, as a multiple of the scatter within windows."""
 WORTH = 0.05
-"""Smaller parts of an orbit do not count as a difference."""
+"""Smallest difference that counts, as a fraction of the size of the orbit."""
 WAYS = ("up", "down")
 
 
 def ramp_revolutions(model: AbstractForcedSystem, first: float, last: float, seconds: float) -> int:
-    """Revolutions of a ramp from `first` to `last` [rad/s] that takes so many seconds: the speed rises by equal amounts
-    in every revolution, so that its mean over time is the logarithmic one."""
+    """Number of revolutions of a ramp from `first` to `last` [rad/s] in `seconds`, by the logarithmic mean speed, since
+    the speed changes by equal amounts per revolution."""
     low, high = (abs(float(model.turning_speed(speed))) for speed in (first, last))
     return math.ceil(seconds * (high - low) / (2 * math.pi * math.log(high / low)))
 
@@ -42,10 +42,10 @@ def ramp_up_down(
     settle: int = SETTLE,
     method: AbstractMethod | None = None,
 ) -> xr.Dataset:
-    """Raise the speed of a cage or a whole bearing and lower it again, the state carried along.
+    """Ramp the speed of a cage or a whole bearing up and down again in one continuous motion.
 
-    **Arguments:** model; lowest and highest speed [rad/s]; speed gained per second, in the mean [rad/s^2]; number of
-    windows into which each ramp is cut, about; revolutions at the lowest speed beforehand; method as in `ramp`.
+    **Arguments:** model; lowest and highest speed [rad/s]; mean rate [rad/s^2]; approximate number of windows into
+    which each ramp is divided; revolutions at the first speed before each ramp; method as in `ramp`.
 
     **Returns:** a data set over `way` (up, down) and `window`, at ascending speeds: `size` of the motion of the cage
     centre [m], its `scatter` between the halves of a window, `eccentricity` ratio, and the quantities of the model.
@@ -70,7 +70,7 @@ def ramp_up_down(
     revolutions = each * windows
     options = {"revolutions": revolutions, "samples": SAMPLES, "method": method}
     up = _finished(ramp(model, first, last, discard=settle, **options), "up")
-    begin = -SAMPLES - len(up.beside[:1])  # the beginning of the last revolution
+    begin = -SAMPLES - len(up.beside[:1])  # first sample of the last revolution
     end = tuple(float(c) for c in up.state[begin])
     down = _finished(ramp(model, float(up.speed[begin]), first, discard=settle, start=end, **options), "down")
     ways = [_windows(model, up, windows), _windows(model, down, windows).isel(window=slice(None, None, -1))]
@@ -79,9 +79,8 @@ def ramp_up_down(
 
 
 def apart(found: xr.Dataset) -> Bool[np.ndarray, " windows"]:
-    """Windows in which the motion differs in size between up and down: by more than three times the usual scatter of
-    the windows around and 5 % of the larger orbit, in two neighbouring windows at least. Chaos scatters, and is no
-    hysteresis by itself."""
+    """True for windows with hysteresis: sizes up and down that differ by three times the scatter of the windows around
+    (chaos alone is not hysteresis) and 5 % of the larger orbit, in at least two neighbouring windows."""
     a, b = found["size"].values
     scatter = np.hypot(*(_around(x) for x in found["scatter"].values))
     beyond = np.abs(a - b) > np.maximum(SURE * scatter, WORTH * np.maximum(a, b))
@@ -98,7 +97,7 @@ def stretches_apart(found: xr.Dataset) -> list[tuple[float, float]]:
 
 
 def _around(x: Float[np.ndarray, " windows"]) -> Float[np.ndarray, " windows"]:
-    """The middle one of five neighbours: a jump within one of them is no scatter."""
+    """Running median over five windows, so that a jump within one of them does not count as scatter."""
     return np.median(np.lib.stride_tricks.sliding_window_view(np.pad(x, 2, mode="edge"), 5), axis=1)
 
 
@@ -110,7 +109,7 @@ def _finished(run: Trajectory, way: str) -> Trajectory:
 
 
 def _windows(model: AbstractForcedSystem, run: Trajectory, count: int) -> xr.Dataset:
-    """What a ramp shows, window by window in its own order."""
+    """Data set of a ramp over its windows, in temporal order."""
     n = len(run.state) - len(run.beside[:1])
     place = centres_of(model, run.speed[:n], run.state[:n])
     clearance = float(model.clearance)  # pyright: ignore[reportAttributeAccessIssue]

@@ -1,4 +1,4 @@
-"""Lanes are run: a plan and settings in, one data set out."""
+"""Runs of lanes: from a plan and settings to one data set."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -22,10 +22,10 @@ from .settings import Run
 def run_lanes(plan: Plan, run: Run, progress: Progress | None = None) -> xr.Dataset:
     """Run the lanes of a plan.
 
-    **Arguments:** lanes; settings (`Run.of`); called with lanes done and lanes in all.
+    **Arguments:** plan; settings (`Run.of`); function called with the numbers of finished lanes and of all lanes.
 
-    **Returns:** a data set over the axes of the plan, as `lanes.dataset` describes it. Lanes that fail are NaN with an
-    outcome and leave their neighbours untouched.
+    **Returns:** a data set over the axes of the plan, described in `lanes.dataset`. Lanes that fail are NaN with an
+    outcome and do not affect others.
     """
     scale = plan.scale
 
@@ -39,7 +39,7 @@ def run_lanes(plan: Plan, run: Run, progress: Progress | None = None) -> xr.Data
         label = np.where(lost, "failed", np.array([motion_label(x, plan.model.samples) for x in seen.place]))
         return dataset(plan, run, seen, scale, label)
     rounds, escape, end = [], None, 0
-    if run.exponents and run.blocks > 1:  # without an error of the exponent no lane is called chaotic
+    if run.exponents and run.blocks > 1:  # without an error of the exponent no lane is labelled chaotic
         if run.confirm:
 
             def again(lanes: np.ndarray, times: int) -> Labelled:
@@ -53,7 +53,7 @@ def run_lanes(plan: Plan, run: Run, progress: Progress | None = None) -> xr.Data
 
 
 def _labelled(seen: Observation, scale: Float[np.ndarray, "lanes dim"]) -> Labelled:
-    """Labels of lanes while they were observed, with the largest exponent and its standard error."""
+    """Labels of lanes from their observation, with the largest exponent and its standard error."""
     exponent = error = np.full(len(scale), np.nan)
     if seen.growth.shape[2]:
         exponent, error = seen.growth.mean(axis=1)[:, 0], exponent_error(seen)[:, 0]
@@ -68,22 +68,22 @@ def sweep(
     progress: Progress | None = None,
     **settings: Any,
 ) -> xr.Dataset:
-    """Run a model over speed from several initial states: strobe states, Lyapunov exponents, labels; of a whole bearing
-    slips, forces, losses and wear.
+    """Run a model over speed from several initial states: strobe states, Lyapunov exponents and labels; for a whole
+    bearing slips, forces, losses and wear.
 
     **Arguments:**
 
-    - `model`: a cage, a whole bearing, any system of one's own; or several designs that differ in their numbers only.
-    - `speeds`: ascending speeds [rad/s], of a cage its own, of a whole bearing its shaft's; `jaxcage.rpm` makes them
-        from revolutions per minute.
-    - `initial_states`: initial states, each a tuple of numbers, or an array with states of its own for each speed; or
-        how many of the model's own; by default all of these.
-    - `progress`: called with lanes done and lanes in all.
-    - `settings`: fields of `jaxcage.lanes.Run`, which names their defaults, such as `discard`, `revolutions`, `blocks`,
-        `exponents`, `confirm`, `horizon` and `method`; or the `tolerance` of machine code, relative to state and scale.
+    - `model`: a cage, a whole bearing, any system of your own; or several designs that differ in their numbers only.
+    - `speeds`: ascending speeds [rad/s], of the cage for a cage model, of the shaft for a whole bearing; `jaxcage.rpm`
+        converts them from rpm.
+    - `initial_states`: initial states, each a tuple of numbers; an array with states for each speed; or the number of
+        the model's own initial states to use, by default all.
+    - `progress`: function called with the numbers of finished lanes and of all lanes.
+    - `settings`: fields of `jaxcage.lanes.Run`, such as `discard`, `revolutions`, `blocks`, `exponents`, `confirm`,
+        `horizon` and `method`; or the `tolerance` of machine code, relative to state and scale.
 
-    **Returns:** a data set over `speed` and `start` (of several designs over `design` too), with the labels, exponents
-    and quantities of every lane. Lanes that fail are NaN with an outcome.
+    **Returns:** a data set over `speed` and `initial_state` (and `design` for several designs), with the labels,
+    exponents and quantities of every lane. Lanes that fail are NaN with an outcome.
 
     **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, and for impossible counts;
     `RuntimeError` without double precision.

@@ -1,4 +1,4 @@
-"""Settings of a run: how long lanes run, what is computed of them, and how exactly."""
+"""Settings of a run: its length, its accuracy, and the results that are computed."""
 
 import dataclasses
 from typing import Any
@@ -12,25 +12,23 @@ from ..solve import AbstractMethod, native
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """How long lanes run, and how exactly; the same for all lanes of a plan.
-
-    The defaults are those of a forced system; a model has its own where these do not suit it (`run_defaults`).
-    """
+    """Settings of a run, common to all lanes of a plan; a model may have its own defaults (`run_defaults`)."""
 
     discard: int = 300
-    """Revolutions left out at the beginning."""
+    """Revolutions discarded at the beginning."""
     revolutions: int = 300
     """Revolutions observed after that."""
     blocks: int = 20
-    """Blocks of the observed revolutions, from whose scatter standard errors come."""
+    """Number of blocks of the observed revolutions, whose scatter yields standard errors."""
     exponents: int = 1
     """Number of Lyapunov exponents, from the largest down."""
     exponent_revolutions: int = 0
-    """The last of the observed revolutions, in which exponents are followed; 0 takes all."""
+    """Revolutions at the end of those observed over which exponents are computed; 0 for all."""
     keep: int = 64
-    """Number of strobe states that are kept, the last ones. A period k is seen with at least 2 k of them."""
+    """Number of strobe states kept, the last ones; a period k can only be detected with at least 2 k of them."""
     confirm: bool = True
-    """Run what is not periodic, its neighbours in speed and a tenth of the rest again with finer steps."""
+    """True to run lanes that are not periodic, their neighbours in speed and a tenth of the rest again with smaller
+    steps."""
     horizon: int = 3000
     """Revolutions of the whole run to which lanes that have not settled are followed; 0 for none."""
     settled: int = 0
@@ -40,9 +38,9 @@ class Run:
 
     @classmethod
     def of(cls, model: AbstractForcedSystem, **given: Any) -> "Run":
-        """The settings for a model: what is given and not None, else the model's own defaults, else those above.
+        """Settings for a model: those given and not None, else the model's own defaults, else those of the class.
 
-        `tolerance` and `error` make the method that machine code takes.
+        `tolerance` and `error` are those of the machine-code method `native`.
 
         **Raises:** `ValueError` for settings that do not go together, or not with the model.
         """
@@ -79,12 +77,12 @@ class Run:
 
     @property
     def block(self) -> int:
-        """Revolutions of a block."""
+        """Number of revolutions per block."""
         return self.revolutions // self.blocks
 
     @property
     def followed(self) -> int:
-        """Number of blocks, the last ones, in which exponents are followed."""
+        """Number of blocks at the end in which exponents are computed."""
         if not self.exponent_revolutions:
             return self.blocks
         return min(self.blocks, max(2, -(-self.exponent_revolutions // self.block)))

@@ -1,9 +1,9 @@
 """The results of a study on disk: a zarr folder that plain xarray opens, filled chunk by chunk.
 
-A chunk of lanes is one file of each variable, with a checksum at its end (zarr's codec `crc32c`), put in place in one
-step, `outcome` last. A chunk is finished if all of its files are there and agree with their checksums; any other one is
-pending, and is computed again with the same bits. So two processes may write to one store without a lock: both write
-the same files. Nothing in the folder depends on when, where or in which order it was written.
+A chunk of lanes is one file per variable, with a checksum at its end (zarr's codec `crc32c`), each written atomically
+and `outcome` last. A chunk is finished if all of its files exist and agree with their checksums; any other one is
+pending, and is computed again with identical bits. Several processes may therefore write to one store without a lock.
+Nothing in the folder depends on when, where or in which order it was written.
 """
 
 import contextlib
@@ -35,33 +35,34 @@ if TYPE_CHECKING:
 FORMAT = 4
 """Version of the layout of stores."""
 Results = dict[str, np.ndarray]
-"""Output by name; the lanes are the first axis."""
+"""Results of a chunk by name, with its block of the grid as the first axes."""
 
 
 class Variable(NamedTuple):
-    """A variable that is stored of every lane."""
+    """A variable that is stored for every lane."""
 
     text: str
     unit: str
     exponents: bool = False
-    """True for one number of each exponent."""
+    """True for one number per exponent."""
     names: tuple[str, ...] = ()
-    """Meanings of the codes 0, 1, ...; none for numbers that are no codes."""
+    """Meanings of the codes 0, 1, ...; empty for numbers that are not codes."""
 
 
 KNOWN = "jaxcage jax jaxlib numpy diffrax equinox lineax optimistix builtins".split()
-"""Packages whose code is known by their versions."""
+"""Packages whose code is identified by their versions."""
 OUTCOME = "outcome"
-"""The variable that is written last: a chunk without it has never been finished."""
+"""Variable that is written last: a chunk without it has never been finished."""
 
 
 class Store:
-    """The store of a study, made if there is none."""
+    """The store of a study, created if there is none.
+
+    **Raises:** `ValueError` for a folder that holds anything but results of this study, and for a study of the user's
+    own code without a name and a version.
+    """
 
     def __init__(self, path: str | Path, study: "Study"):
-        """**Raises:** `ValueError` for a folder that holds anything else than results of this very study, and
-        for a study of the user's own code without a name and a version.
-        """
         self.path, self.study = Path(path), study
         if (own := _own_code([study.model, study.run.method])) and not (study.name and study.version):
             said = f"must be given, since a store cannot tell by itself whether your own {own} is still the same."
@@ -73,21 +74,18 @@ class Store:
         self._finished: set[int] = set()
 
     def pending(self, among: Iterable[int] | None = None) -> list[int]:
-        """Chunks that are not finished, or are not what was written."""
+        """Chunks that are not finished, or that disagree with their checksums."""
         chunks = range(self.study.grid.chunks) if among is None else among
         unknown = [chunk for chunk in chunks if chunk not in self._finished]
         self._finished |= {chunk for chunk in unknown if _is_finished(self.path, self._arrays, chunk)}
         return [chunk for chunk in unknown if chunk not in self._finished]
 
     def write(self, chunk: int, results: Results) -> None:
-        """Put the results of a chunk in place.
-
-        **Raises:** `OSError`, one sentence with the reason and how to go on.
-        """
+        """Write the results of a chunk. **Raises:** `OSError`, with the reason and the remedy."""
         with _going_on(self.path):
             try:
                 self._put(chunk, results)
-            except FileNotFoundError:  # another process has just tidied up what is written aside
+            except FileNotFoundError:  # another process has just removed the temporary files
                 self._put(chunk, results)
         self._finished.add(chunk)
 
@@ -97,7 +95,7 @@ class Store:
             self._arrays[name][region] = results[name]
 
     def tidy(self) -> None:
-        """Remove what kills left behind; for a store that nobody writes to any more."""
+        """Remove temporary files of killed processes from a store to which nobody writes any more."""
         for left in self.path.rglob("*.partial"):
             with contextlib.suppress(OSError):
                 left.unlink()
@@ -106,15 +104,15 @@ class Store:
 
 
 def open_study(path: str | Path) -> xr.Dataset:
-    """The results of a study so far, read from disk when they are used.
+    """Open the results of a study so far, which are read from disk when they are used.
 
-    Lanes that have not been run are NaN with the label and outcome `pending`. Reading a chunk that does not agree with
-    its checksum is a `ValueError` of zarr's; running the study again computes it again.
+    Lanes that have not been run are NaN with the label and outcome `pending`. Reading a chunk that disagrees with its
+    checksum raises zarr's `ValueError`; running the study again computes it again.
 
     **Raises:** `FileNotFoundError`; `ValueError` if it cannot be opened.
     """
     _opened(Path(path), "r")
-    # Version 3 only, and not what consolidated metadata say: version 2 has a codec that runs what a file says.
+    # Only version 3, without consolidated metadata: version 2 has a codec that may execute code from a file.
     options: dict[str, Any] = dict(engine="zarr", zarr_format=3, consolidated=False, chunks=None)
     try:
         return decoded(xr.open_dataset(path, **options))
@@ -123,8 +121,7 @@ def open_study(path: str | Path) -> xr.Dataset:
 
 
 def _is_finished(path: Path, arrays: Mapping[str, Any], chunk: int) -> bool:
-    """True if all files of a chunk of a store are there and agree with their checksums. The axes of all variables begin
-    with those of `outcome`."""
+    """True if all files of a chunk exist and agree with their checksums."""
     counts = arrays[OUTCOME].cdata_shape
     place = tuple(map(int, np.unravel_index(chunk, counts)))
     for name in sorted(arrays, key=lambda name: name != OUTCOME):
@@ -142,16 +139,13 @@ def _is_finished(path: Path, arrays: Mapping[str, Any], chunk: int) -> bool:
 
 
 def _opened(path: Path, mode: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Attributes and arrays of a store.
-
-    **Raises:** `FileNotFoundError`; `InputError` if it is damaged.
-    """
+    """Attributes and arrays of a store. **Raises:** `FileNotFoundError`; `InputError` if it is damaged."""
     import zarr
 
     missing = FileNotFoundError(f"There is no study at '{path}'.")
     if not (path / "zarr.json").is_file():
         raise missing
-    every_file: Any = {"array.write_empty_chunks": True}  # so that one that is not there has never been written
+    every_file: Any = {"array.write_empty_chunks": True}  # so that a missing file has never been written
     try:
         with zarr.config.set(every_file):
             group = zarr.open_group(path, mode=mode, zarr_format=3, use_consolidated=False)  # pyright: ignore
@@ -170,7 +164,7 @@ def _damaged(path: str | Path, error: Exception) -> InputError:
 
 @contextlib.contextmanager
 def _going_on(path: Path) -> Iterator[None]:
-    """Around writing: what the system refuses becomes one sentence."""
+    """Add the store and the remedy to the message of an `OSError` while writing."""
     try:
         yield
     except OSError as error:
@@ -181,10 +175,7 @@ def _going_on(path: Path) -> Iterator[None]:
 
 
 def _same(path: Path, study: "Study") -> dict[str, Any]:
-    """Arrays of the store of this study.
-
-    **Raises:** `ArgumentError`.
-    """
+    """Arrays of the store of this study. **Raises:** `ArgumentError` for another one; `InputError` for its format."""
     refused = "must be a new folder or the store of this study, but"
     try:
         about, arrays = _opened(path, "r+")
@@ -202,7 +193,7 @@ def _same(path: Path, study: "Study") -> dict[str, Any]:
 
 
 def _differences(theirs: Any, ours: Any, name: str = "") -> list[str]:
-    """Names of what differs between two nested mappings."""
+    """Names of the entries that differ between two nested mappings."""
     if not (isinstance(theirs, dict) and isinstance(ours, dict)):
         return [] if theirs == ours else [name]
     keys = [key for key in {**ours, **theirs} if theirs.get(key) != ours.get(key)]
@@ -211,7 +202,7 @@ def _differences(theirs: Any, ours: Any, name: str = "") -> list[str]:
 
 
 def _own_code(x: Any) -> str | None:
-    """The first class or function in a tree that belongs neither to this package nor to one that it is built on."""
+    """First class or function in a tree that belongs neither to this package nor to its dependencies."""
     if isinstance(x, tuple | list | dict):
         parts = list(x.values() if isinstance(x, dict) else x)
     else:
@@ -222,11 +213,11 @@ def _own_code(x: Any) -> str | None:
     return next(filter(None, map(_own_code, parts)), None)
 
 
-# The empty store: what describes it follows from the study alone, byte for byte.
+# The empty store: its metadata depend on the study alone, byte for byte.
 
 
 def _create(path: Path, study: "Study") -> None:
-    """Make an empty store beside its place and move it there in one step; whoever comes second leaves it alone."""
+    """Create an empty store in a temporary folder and rename it; if another process is faster, its store is kept."""
     path.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent))
     try:
@@ -244,7 +235,7 @@ def _write(path: Path, study: "Study") -> None:
     import zarr
     from zarr.codecs import Crc32cCodec, ZstdCodec
 
-    plan, compressors = study.grid, (ZstdCodec(), Crc32cCodec())  # any reader of zarr compares the checksums
+    plan, compressors = study.grid, (ZstdCodec(), Crc32cCodec())  # any reader of zarr verifies the checksums
     coordinates = _coordinates(study)
     dataset = xr.Dataset(coords=coordinates, attrs=_attributes(study))
     checked = {name: {"compressors": compressors} for name in coordinates}
@@ -262,7 +253,7 @@ def _write(path: Path, study: "Study") -> None:
             dimension_names=(*plan.axes, *axes),
             attributes={"long_name": variable.text, "units": variable.unit, **flags(variable.names)},
         )
-    with warnings.catch_warnings():  # zarr warns that the specification does not have this yet; xarray warns without it
+    with warnings.catch_warnings():  # zarr warns that this is not in the specification yet; xarray warns without it
         warnings.simplefilter("ignore")
         zarr.consolidate_metadata(path)
 

@@ -1,4 +1,4 @@
-"""Studies: lanes over any parameters, computed chunk by chunk into a store, from where an earlier run stopped."""
+"""Studies: lanes over any parameters, computed chunk by chunk into a store, which an interrupted run can resume."""
 
 import dataclasses
 import functools
@@ -28,34 +28,34 @@ from .store import Results, Store, Variable, open_study
 
 
 CLOSING = 2 * LONGEST_PERIOD
-"""Strobe states over which orbits are seen to close."""
+"""Number of strobe states kept, enough to detect the longest period."""
 
 
 Vary = Mapping[str, Float[Array, " values"] | Float[np.ndarray, " values"] | Between]
-"""Parameter, or `"speed"` or `"oil"` -> values that make an axis of the grid [SI], or how to sample it."""
+"""Mapping of parameter names, `"speed"` or `"oil"` to values [SI], an axis of the grid, or to a distribution."""
 Shard = tuple[int, int]
-"""(i, n): the i-th of n parts, counted from 1."""
+"""Part (i, n): the i-th of n parts, counted from 1."""
 SCALARS = ("peak", "error", "steps")
-"""Numbers that every lane has, whatever its model reports."""
+"""Variables stored for every lane of any model."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Study:
-    """A model, the grid over which it is run, and the settings of its runs."""
+    """A model, the grid over which it is run, and the settings of the runs."""
 
     model: AbstractForcedSystem
     grid: Grid
     run: Run
     name: str = ""
     version: str = ""
-    """Name and version of code of the user's own, which a store cannot recognise by itself."""
+    """Version of the user's own code `name`, which a store cannot recognise without these two."""
 
     def __post_init__(self):
         self.grid.require_known(self.model)
 
     @property
     def description(self) -> str:
-        """All that a store is recognised by, as JSON."""
+        """JSON by which a store recognises its study."""
         run = {f.name: getattr(self.run, f.name) for f in dataclasses.fields(self.run) if f.name != "method"}
         configured = configuration_of(self.model)
         system = json.loads(configured["configuration"]) if configured else numbers_of(self.model)
@@ -65,7 +65,7 @@ class Study:
 
     @property
     def variables(self) -> dict[str, Variable]:
-        """Variables that are stored of every lane, by name."""
+        """Variables that are stored for every lane, by name."""
         known = lambda name: (quantity(name).text, quantity(name).unit)
         found = {name: Variable(*known(name)) for name in SCALARS}
         if self.run.exponents:
@@ -77,7 +77,7 @@ class Study:
         return found | {name: Variable(*known(name), names=words) for name, words in CODES.items()}
 
     def chunk(self, number: int) -> Results:
-        """The results of a chunk, laid out as its block of the grid; the bits of a lane are the same in any company."""
+        """Compute the results of a chunk, in the shape of its block; a lane's bits do not depend on the chunk."""
         found = coded(run_lanes(self.grid.plan(self.model, self.grid.lanes_of(number)), self.run))
         values = {name: x.values for name, x in found.data_vars.items()}
         values |= {f"{x.name}_standard_error": scatter(values[f"{x.name}_blocks"]) for x in self.model.quantities}
@@ -100,28 +100,27 @@ def study(
     version: str = "",
     **settings: Any,
 ) -> xr.Dataset:
-    """Run a model over any grid or sample of its parameters, and keep what each lane does in a zarr folder.
+    """Run a model over any grid or sample of its parameters, and store the results of each lane in a zarr folder.
 
-    What is stored already is not computed again: after a kill the same call continues where it stopped, and the store
-    ends up with the same bits as that of an unbroken run, whichever processes computed it.
+    Stored results are not computed again: after an interruption the same call resumes, and the store ends up with the
+    same bits as after an uninterrupted run, whichever processes computed it.
 
     **Arguments:**
 
-    - `model`: a cage, a whole bearing or a system of one's own.
-    - `vary`: what is varied. Arrays are axes of a grid [SI]; those that are `jaxcage.lanes.Between` are sampled
-        together. The speed [rad/s] must be among them, of a whole bearing the shaft's; `oil` is the ISO VG grade of a
-        mineral oil.
+    - `model`: a cage, a whole bearing or a system of your own.
+    - `vary`: parameters by name. Arrays are axes of a grid [SI]; all `jaxcage.lanes.Between` are sampled together. The
+        speed [rad/s], of the shaft for a whole bearing, must be among them; `oil` is the ISO VG grade of a mineral oil.
     - `store`: the folder.
-    - `samples`, `seed`: number of samples (a scrambled Sobol sequence; best a power of 2) and seed.
-    - `initial_states`: how many of the model's own initial states are run at each point, by default all.
-    - `lanes`: lanes of a chunk, at most; by default 2048, or fewer where a lane takes long.
+    - `samples`, `seed`: number of samples (a scrambled Sobol sequence; preferably a power of 2) and seed.
+    - `initial_states`: number of the model's own initial states to run at each point, by default all.
+    - `lanes`: maximum number of lanes per chunk; by default 2048, or fewer for models with expensive lanes.
     - `shard`: (i, n) runs every n-th chunk from the i-th on. All shards write to the same folder.
-    - `progress`: called with lanes done and lanes in all, those that were stored before included.
-    - `name`, `version`: of a function or class of your own that the model is made of. They must be given then, since a
-        store cannot tell by itself whether your code is still the same: change the version whenever it changes.
+    - `progress`: function called with the numbers of finished and of all lanes, including those already stored.
+    - `name`, `version`: name and version of your own code, required if the model contains a function or class of your
+        own, since a store cannot detect that it has changed: change the version whenever the code changes.
     - `settings`: fields of `jaxcage.lanes.Run`; lanes are neither confirmed nor followed to a horizon.
 
-    **Returns:** the store, opened by xarray: variables over the samples, the axes of the grid and `start`.
+    **Returns:** the store, opened by xarray: variables over the samples, the axes of the grid and `initial_state`.
 
     **Raises:** `ValueError` for arguments that do not fit together, and for a store of another study.
     """
@@ -142,7 +141,7 @@ def run_study(
     shard: Shard = (1, 1),
     progress: Progress | None = None,
 ) -> None:
-    """Compute what the store at `path` lacks; arguments as for `study`."""
+    """Compute the pending chunks of the store at `path`; arguments as for `study`."""
     i, n = shard
     if not 1 <= i <= n:
         raise ArgumentError("shard", said=f"must be (i, n) with i from 1 to n, but ({i}, {n}) was given.")
@@ -161,7 +160,7 @@ def run_study(
 
 
 Stage = Callable[[str, int, int], None]
-"""Called with what is under way, and how many of its lanes are done."""
+"""Function called with the name of the present stage and the numbers of its finished lanes and of all its lanes."""
 
 
 def label_map(
@@ -175,20 +174,20 @@ def label_map(
     stage: Stage | None = None,
     **settings: Any,
 ) -> xr.Dataset:
-    """Labels and exponents over two parameters.
+    """Compute labels and exponents over two parameters.
 
     **Arguments:**
 
-    - `model`: a cage, a whole bearing or a system of one's own.
-    - `x`, `y`: name and ascending values [SI] of a parameter each; `"speed"` is one.
-    - `speed`: the speed [rad/s], if it is neither of them.
-    - `initial_states`: how many of the model's own initial states are run at each point.
-    - `persist`: revolutions that chaos must outlast to count: lanes found chaotic are run again with so many discarded,
-        and what has died out by then was a transient. 0 turns this off.
-    - `stage`: called as lanes are done.
+    - `model`: a cage, a whole bearing or a system of your own.
+    - `x`, `y`: name and ascending values [SI] of one parameter each, which may be `"speed"`.
+    - `speed`: speed [rad/s], if it is neither of them.
+    - `initial_states`: number of the model's own initial states to run at each point.
+    - `persist`: revolutions that chaos must outlast: lanes found chaotic are run again with this many revolutions
+        discarded, so that chaotic transients that end earlier get another label. 0 turns this off.
+    - `stage`: function called as lanes finish.
     - `settings`: fields of `jaxcage.lanes.Run`; lanes are neither confirmed nor followed to a horizon.
 
-    **Returns:** a data set over x, y and `start`, with the speed as a coordinate.
+    **Returns:** a data set over x, y and `initial_state`, with the speed as a coordinate.
 
     **Raises:** `ValueError` for arguments that do not fit together.
     """
@@ -222,7 +221,7 @@ def label_map(
 
 
 def numbers_of(module: eqx.Module) -> dict[str, Any]:
-    """All numbers of a module by the names of their places."""
+    """Numbers of a module by their paths."""
     leaves, _ = jax.tree_util.tree_flatten_with_path(module)
     named = lambda path: jax.tree_util.keystr(path).lstrip(".")
     return {named(path): np.asarray(x).tolist() for path, x in leaves if eqx.is_array_like(x)}

@@ -1,4 +1,4 @@
-"""Periodic orbits of forced systems: found, followed, and differentiated where they bifurcate.
+"""Periodic orbits of forced systems, their branches and bifurcation points, and derivatives of all of these.
 
 | module            | responsibility                                                                      |
 |-------------------|-------------------------------------------------------------------------------------|
@@ -6,13 +6,13 @@
 | `newton`          | Newton's method for orbits, damped; derivatives by the implicit function theorem    |
 | `orbit`           | periodic orbits, their multipliers, and the determinant these must have             |
 | `point`           | bifurcation points: kinds, and matrices and functions that vanish there             |
-| `arclength`       | step control of continuation: predictions, accepted and refused steps               |
+| `arclength`       | step control of continuation: predictions, accepted and rejected steps              |
 | `continuation`    | pseudo-arclength continuation, an iterator with corrector, step control and events  |
 | `location`        | bifurcations between orbits of a branch, compared with every change of stability    |
 | `branch`          | branches of orbits with their bifurcations; period-doubling cascades                |
 | `bifurcation`     | Newton's method for bifurcation points                                              |
 | `curves`          | curves of bifurcation points in two parameters; edges from one design to another    |
-| `search`          | search for orbits without a hint of where they are                                  |
+| `search`          | search for synchronous orbits over a range of speed, without an initial guess       |
 | `unstable`        | unstable ranges of the synchronous orbit; mechanisms of chaotic edges               |
 | `gradient`        | derivatives and elasticities of edges, derivatives of orbits and multipliers        |
 """

@@ -1,8 +1,8 @@
-"""Step control of continuation: predict the next point of a curve, accept or refuse it, and choose the next length.
+"""Step control of continuation: predict the next point of a curve, accept or reject it, and choose the next length.
 
-The prediction is the cubic through the last two points and their tangents. A point of the same curve has the tangent
-that belongs to its place, and the orientation of the curve; a point of another curve beside it has neither, and a step
-to it is refused.
+The prediction is the cubic through the last two points and their tangents. A point of the same curve has a tangent that
+is consistent with its position, and the orientation of the curve; a point of a neighbouring curve has neither, and a
+step to it is rejected.
 """
 
 import dataclasses
@@ -15,24 +15,24 @@ import numpy as np
 from .._errors import ArgumentError
 
 
-AIM = 3e-3  # distance from its prediction that the next point should have, in the unknowns' units
-VEER = 0.7  # angle by which the next step should turn, over the largest angle allowed
+AIM = 3e-3  # target distance of the next point from its prediction, in the unknowns' units
+VEER = 0.7  # target angle between tangents of the next step, over the largest angle allowed
 SHRINKAGE, GROWTH = 0.5, 1.8  # smallest and largest ratio of a step to the one before, if that was accepted
 TURN = 0.9  # smallest cosine of the angle between the tangents of a step
-BEND = 0.3  # largest correction over the step's length: with more, Newton's method may have gone to another curve
-SWING = 0.5  # largest change of the derivative, over its size and one: with more, folds may have been passed over
+BEND = 0.3  # largest correction over the step's length: beyond it, Newton's method may have gone to another curve
+SWING = 0.5  # largest change of the derivative, over its size plus one: beyond it, folds may have been passed over
 NEARBY, OF_LENGTH, OF_MISSED = 1e-4, 1e-2, 0.5
-"""Largest distance of a point from where its tangent says that it is: in the unknowns' units, over the step's length,
-or over its distance from the prediction."""
+"""Largest distance of a point from the position that its tangent implies: in the unknowns' units, over the step's
+length, or over its distance from the prediction."""
 
 
 class Points(NamedTuple):
     """Points of curves: NumPy arrays, with an axis of points first if there are several.
 
-    There are the unknowns u, shape (n,), the unit tangent on the side of the plane's normal, the derivative of the
-    equations, shape (m, n), what else the equations tell (`aux`), and the steps per revolution. The error is the
-    distance to the point by half the steps (see `AbstractEquations.apart`), `excess` its ratio to what is allowed, and
-    `moved` the same distance in the unknowns' units.
+    `u`: unknowns, shape (n,); `tangent`: unit tangent on the side of the plane's normal; `jacobian`: derivative of the
+    equations, shape (m, n); `aux`: further results of the equations; `steps` per revolution. `error` is the distance to
+    the point with half the steps (see `AbstractEquations.apart`), `excess` its ratio to the tolerance, and `moved` the
+    distance in the unknowns' units.
     """
 
     u: Any
@@ -47,37 +47,34 @@ class Points(NamedTuple):
 
     @staticmethod
     def stacked(points: Sequence["Points"]) -> "Points":
-        """Return single points as a row."""
+        """Stack single points as a row."""
         return jax.tree.map(lambda *x: np.stack(x), *points)
 
     def take(self, which: Any) -> "Points":
-        """Return some of the points."""
-        return jax.tree.map(lambda x: x[which], self)  # of NumPy: JAX takes a millisecond for each array
+        return jax.tree.map(lambda x: x[which], self)  # NumPy arrays: JAX takes a millisecond for each
 
     def put(self, which: np.ndarray, new: "Points") -> "Points":
-        """Return the points with `new` ones in these places."""
+        """Return the points with those at `which` replaced."""
         whole = jax.tree.map(np.array, self)
         jax.tree.map(lambda x, y: x.__setitem__(which, y), whole, new)
         return whole
 
     def with_errors_of(self, old: "Points") -> "Points":
-        """Return the points with the errors of others."""
         return self._replace(error=old.error, excess=old.excess, moved=old.moved)
 
     def turned(self, sign: Any) -> "Points":
-        """Return the same points, to be followed the other way if `sign` is -1."""
+        """Return the points with their tangents reversed where `sign` is -1."""
         return self._replace(tangent=self.tangent * np.asarray(sign)[..., None])
 
     def after(self, back: "Points") -> "Points":
-        """Return in a row the points of two directions from one point, from the end of `back` on."""
+        """Join two directions from one point in a row, from the end of `back` on."""
         back = back.take(slice(None, 0, -1)).turned(-1.0)
         return jax.tree.map(lambda a, b: np.concatenate([a, b]), back, self)
 
 
 class Comparison(NamedTuple):
-    """A new point beside its prediction and the last point: its distance from the prediction, the angle between the
-    tangents over the largest allowed, whether it is sure to be on the curve or on one that crosses it, and whether the
-    determinant of the equations with the tangent has the same sign."""
+    """Comparison of a new point: distance from its prediction; angle between its tangent and the last, over the largest
+    allowed; `sure`, True if it is on the curve or one that crosses it; `same`, True if the orientation is the same."""
 
     missed: float
     turned: float
@@ -87,7 +84,7 @@ class Comparison(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class StepControl:
-    """Lengths of steps in the unknowns' units, and their largest number in each direction."""
+    """Lengths of steps in the unknowns' units, and their maximum number in each direction."""
 
     first: float = 0.02
     longest: float = 0.5
@@ -117,9 +114,9 @@ class StepControl:
     ) -> Comparison:
         """Compare a new point with its prediction and the last point.
 
-        The prediction over `length` from two points `apart` leaves out a s^2 (s + apart)^2, which is nearly as large in
-        the tangent as in the point: a point elsewhere than its tangent says is not of this curve. The determinant of
-        the equations with the tangent keeps its sign along a curve, at folds too, but not where it crosses another.
+        The prediction over `length` from two points `apart` omits the term a s^2 (s + apart)^2, which fixes the ratio
+        of the errors of point and tangent: a point that violates it is not on this curve. The determinant of the
+        equations with the tangent keeps its sign along a curve, at folds too, but not where it crosses another.
         """
         if not new.converged:
             return Comparison(np.inf, np.inf, False, False)
@@ -137,10 +134,10 @@ class StepControl:
         return Comparison(float(missed), float(turned), bool(sure), orientation(new) == orientation(last))
 
     def after_success(self, length: float, step: Comparison) -> float:
-        """Return the length of the step after an accepted one. The cubic's error grows with its fourth power."""
+        """Return the length of the step after an accepted one; the error of the cubic grows with its fourth power."""
         growth = min((AIM / max(step.missed, 1e-12)) ** 0.25, VEER / max(step.turned, 1e-12))
         return min(self.longest, length * float(np.clip(growth, SHRINKAGE, GROWTH)))
 
     def after_failure(self, length: float, converged: bool) -> float:
-        """Return the length with which a refused step is repeated; below `shortest` the curve has no next point."""
+        """Return the length with which a rejected step is repeated."""
         return length / (2 if converged else 4)

@@ -1,4 +1,4 @@
-"""Bifurcation points of periodic orbits, by Newton's method on the orbit together with a scalar that vanishes there."""
+"""Bifurcation points of periodic orbits, by Newton's method on the orbit and a scalar that vanishes at the point."""
 
 import dataclasses
 from typing import Any, NamedTuple, cast
@@ -52,8 +52,8 @@ from .problem import (
 
 
 TANGENTIAL = 1e-2  # smallest change of |mu| for a relative change of the parameter by 1 at a crossing
-ON_CIRCLE = 1e-5  # largest squared distance of a critical multiplier: a double one is known to the root of rounding
-WALK = StepControl(first=0.05, longest=0.25, most=250)  # along a branch on which a bifurcation is looked for
+ON_CIRCLE = 1e-5  # largest squared distance of a critical multiplier: a double one is accurate to sqrt(rounding)
+WALK = StepControl(first=0.05, longest=0.25, most=250)  # along a branch that is searched for a bifurcation
 
 
 class Singular(NamedTuple):
@@ -65,7 +65,7 @@ class Singular(NamedTuple):
 
 
 class PointEquations(AbstractEquations):
-    """The orbit's equations and g = 0, the scalar that vanishes where a matrix is singular (see `bordered`).
+    """The orbit's equations and g = 0, a scalar that vanishes where a matrix is singular (see `bordered`).
 
     `critical` is the critical multiplier, -1 or 1, or None for a complex pair.
     """
@@ -83,7 +83,7 @@ class PointEquations(AbstractEquations):
         return found.aux.monodromy
 
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
-        """Compare by the change of the parameters, a unit of which is a tenth of their size."""
+        """Compare the parameters, whose unit is a tenth of their size."""
         shift = abs(moved[..., self.problem.dimension :]).max(-1)
         return shift, shift / (10 * POINT)
 
@@ -101,22 +101,23 @@ def bifurcation(
 ) -> Point:
     """Find the bifurcation of `kind` near `guess`, with `parameter` free.
 
-    If Newton's method finds none, the branch of orbits through `guess` is followed both ways to the nearest.
+    If Newton's method fails, the branch of orbits through `guess` is followed both ways to the nearest bifurcation.
 
     **Arguments:**
 
     - `kind`: `period-doubling`, `Neimark-Sacker` or `fold`. Branch points, which only systems with a symmetry have, are
-        found on a `branch`.
-    - `guess`: a value of the parameter [SI], whose orbit is then found by simulation; an `Orbit` or a `Point`; or a
+        found by `branch`.
+    - `guess`: a value of the parameter [SI], at which the orbit is found by simulation; an `Orbit` or a `Point`; or a
         pair (state [SI], value of the parameter).
     - `parameter`: `"speed"`, the name of a parameter, or a function that picks it from the system.
-    - `speed`: speed [rad/s], if it is not the parameter and `guess` does not have it.
+    - `speed`: speed [rad/s], if it is not the parameter and `guess` does not contain it.
     - `periods`: revolutions after which the orbit closes; by default those of `guess`, else 1.
-    - `reach`: how far the branch is followed, as a fraction of the parameter's value (of 1 if that is 0). 0 turns
-        this off, and so do `jit`, `vmap` and `grad`, under which the result of Newton's method is not known.
+    - `reach`: distance to which the branch is followed, as a fraction of the parameter's value (of 1 if that is 0);
+        0 turns this off. Under `jit`, `vmap` and `grad` the branch is not followed.
 
-    **Returns:** `Point`; it does not raise if there is none, but says where it looked. The function works under `jit`
-    and `vmap`; value, speed and state have derivatives of every order with respect to `system` and `speed`.
+    **Returns:** `Point`; if none is found there is no exception, and the point's `looked` describes the search. The
+    function works under `jit` and `vmap`; value, speed and state have derivatives of every order with respect to
+    `system` and `speed`.
 
     **Raises:** `ValueError` for an unknown kind or parameter, or a guess without a speed.
     """
@@ -173,11 +174,8 @@ def _along_branch(
     reach: float,
     method: AbstractMethod | None,
 ) -> tuple[Point | None, str]:
-    """Return the nearest bifurcation of `kind` on the branch through an orbit, if there is one, and what was searched.
-
-    Near a superstable orbit the scalar that vanishes at the point is flat, and Newton's steps lead anywhere; the branch
-    itself leads on.
-    """
+    """Return the nearest bifurcation of `kind` on the branch through an orbit, or None, and the range searched; this
+    succeeds near superstable orbits, where the scalar of Newton's method is flat."""
     at = float(begin.at)
     away = float(reach) * (abs(at) or 1.0)
     problem = orbit_curves(given, parameter, at - away, at + away, method, periods)
@@ -185,7 +183,7 @@ def _along_branch(
     name = "the parameter" if callable(parameter) else parameter
 
     def passed(curve: Path) -> str:
-        """Event: a point of the kind was passed, and the stability changed."""
+        """Event: the last step passed a point of the kind, and the stability changed."""
         step = Points.stacked(curve.points[-2:])
         before, after = problem.unstable(step)
         found = before != after and any(k == kind for _, k in sign_changes(problem, step))
@@ -201,7 +199,7 @@ def _along_branch(
 
 
 Solved = tuple[Point, PointEquations, Array]
-"""A point without derivatives, its equations and its unknowns."""
+"""A point without derivatives, its equations, and its unknowns."""
 
 
 def solve_point(
@@ -228,7 +226,7 @@ def _solve_point(problem: OrbitProblem, critical: Array | None, counts: Counts, 
 def point_equations(
     problem: OrbitProblem, critical: Array | None, u: Array, given: Given, steps: Any
 ) -> PointEquations:
-    """Return the equations of a point, with borders from the null vectors at the unknowns u, by so many steps."""
+    """Return a point's equations, with `steps` per revolution and borders from the null vectors at the unknowns u."""
     strobe = by_steps(problem, steps).prepare(u, given)
     a = singular_matrix(critical, problem.returned(strobe, u[: problem.dimension])[1])
     return PointEquations(problem, critical, *null_vectors(jnp.where(jnp.isfinite(a), a, 0.0)))
@@ -236,7 +234,7 @@ def point_equations(
 
 @compiled
 def _place(equations: PointEquations, u: Array, given: Given, converged: Array) -> dict[str, Array]:
-    """Return the parameter's value, speed and state; they and their derivatives are NaN if there is no such point."""
+    """Return the parameter's value, speed and state; these and their derivatives are NaN if not `converged`."""
     problem = equations.problem
     keep = lambda x: x * jnp.where(converged, 1.0, jnp.nan)
     speed = jnp.asarray(problem.at(u, given).speed, dtype=float)
@@ -244,14 +242,13 @@ def _place(equations: PointEquations, u: Array, given: Given, converged: Array) 
 
 
 def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -> Point:
-    """Return all that is known of a point."""
     problem, critical, known = equations.problem, equations.critical, cast(Singular, found.aux)
     finite = jnp.all(jnp.isfinite(known.monodromy))
     multipliers = sorted_multipliers(jnp.where(finite, known.monodromy, 0.0))
     matches = to_critical(critical, multipliers) < jnp.sqrt(ON_CIRCLE)
     rate = _critical_rate(critical, problem.dimension, found.newton.jacobian, known)
     at, unit = problem.values(u)[0], problem.units[0]
-    # In the parameter's unit the guess is 10; the value itself may be zero.
+    # The guess is 10 in the parameter's unit; the value itself may be zero.
     error = found.error * unit
     moving = error > SETTLED * jnp.maximum(jnp.abs(at), 10 * unit)
     tangential = jnp.abs(rate) * jnp.maximum(jnp.abs(u[problem.dimension]), 10.0) < TANGENTIAL
@@ -277,9 +274,9 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
 
 
 def _critical_rate(critical: Array | None, n: int, jacobian: Array, known: Singular) -> Array:
-    """Return the rate d|mu| / d parameter of the critical multiplier along the orbit, in the parameter's unit.
+    """Return d|mu| / d parameter of the critical multiplier along the orbit, in the parameter's unit.
 
-    At a fold, where that is infinite, it is the drift of the map along the critical direction.
+    At a fold, where this is infinite, return the drift of the map along the critical direction.
 
     **Arguments:** critical multiplier; dimension of the state; derivative of all equations at the point; null vectors.
     """

@@ -36,16 +36,13 @@ from .problem import SETTLED, SPEED, Given, Parameter, name_of
 
 FEIGENBAUM = 4.669201609102990
 AMPLITUDE, SMALLEST_AMPLITUDE = 0.02, 1e-5
-"""Distance from its period doubling at which a doubled branch is entered, and the smallest tried."""
+"""Distance from the period doubling at which the doubled branch is entered, and the smallest one tried."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Branch:
-    """Orbits in order along a branch, and its bifurcations.
-
-    Values of the parameter and states at phase 0 are in SI units, speeds in rad/s; `steps` are those of a revolution,
-    and `error` is that of `Orbit`.
-    """
+    """Orbits in order along a branch, and its bifurcations: values of the parameter and states at phase 0 [SI], speeds
+    [rad/s], `steps` per revolution, and `error` as in `Orbit`."""
 
     parameter: str
     value: Float[np.ndarray, " points"]
@@ -56,15 +53,15 @@ class Branch:
     special: tuple[Point, ...]
     periods: int
     ended: tuple[str, str]
-    """Why it ends where it begins and where it ends: `range`, it leaves the range; `closed`; `steps`, the largest
-    number; `stopped`, on another branch or after many unstable orbits; `stuck`, no further orbit was found;
-    `inaccurate`, the finest steps do not tell where it is; `doubling`, it forks off."""
+    """Reason for each end, first and last: `range`, the branch leaves the range; `closed`; `steps`, the maximum number
+    was taken; `stopped`, by another branch or after many unstable orbits; `stuck`, no further orbit was found;
+    `inaccurate`, the error is too large even with the most steps; `doubling`, it begins at a period doubling."""
     steps: Int[np.ndarray, " points"]
     error: Float[np.ndarray, " points"]
 
     @property
     def speed_rpm(self) -> Float[np.ndarray, " points"]:
-        """Speeds in revolutions per minute."""
+        """Speeds [rpm]."""
         return self.speed * 30 / np.pi
 
     def __str__(self) -> str:
@@ -94,17 +91,17 @@ def branch(
     steps: StepControl = StepControl(),
     method: AbstractMethod | None = None,
 ) -> Branch:
-    """Follow a branch of periodic orbits both ways from `orbit`, by pseudo-arclength continuation.
+    """Follow a branch of periodic orbits in both directions from `orbit`, by pseudo-arclength continuation.
 
     **Arguments:**
 
     - `orbit`: an `Orbit`, a `Point`, or a pair (state, value of the parameter) near an orbit.
     - `parameter`: `"speed"`, the name of a parameter, or a function that picks it from the system.
     - `lower`, `upper`: range of the parameter [SI], in which `orbit` lies.
-    - `speed`: speed [rad/s], if it is not the parameter and `orbit` does not have it.
+    - `speed`: speed [rad/s], if it is not the parameter and `orbit` does not contain it.
     - `steps`: step lengths; in units of 1/20 of the range for the parameter, and of the system's scale for the state.
 
-    **Raises:** `ValueError` if there is no orbit to start from, or if the range is not finite.
+    **Raises:** `ValueError` if there is no orbit near `orbit`, or if the range is not finite.
     """
     require_x64()
     require_at_least(1, periods=periods)
@@ -129,12 +126,12 @@ def follow_both_ways(
     patience: int | float = math.inf,
     events: Sequence[Event] = (),
 ) -> list[Branch | None]:
-    """Follow a branch through each start, a state [SI] and a value of the parameter.
+    """Follow a branch through each guess, a state [SI] and a value of the parameter.
 
-    A curve that comes upon another one ends there: one branch may come in two parts. It also ends after `patience`
-    unstable orbits in a row, since such a branch may wind without end, or by one of the events.
+    A curve ends where it meets another one, so that one branch may be returned in two parts; by one of the events; and
+    after `patience` unstable orbits in a row, since such a branch may be endless.
 
-    **Returns:** None for a start that is not near an orbit, or lies on the branch of an earlier one.
+    **Returns:** one `Branch` per guess, None for a guess that is not near an orbit, or on the branch of an earlier one.
     """
     problem = problem.around(guesses[0][1]).with_stable_steps(guesses[0])
     first = problem.orbits_near(guesses)
@@ -165,9 +162,9 @@ def follow_both_ways(
 
 
 def _joined(problem: ContinuationProblem, up: Path, down: Path) -> tuple[Points, tuple[str, str]]:
-    """Return both directions as one row of points, and why they end.
+    """Return both directions as one row of points, and the reasons why they end.
 
-    A closed curve, which was gone round twice, is taken once, from an unstable orbit on, so that no stable part is cut.
+    A closed curve was followed twice; it is returned once, from an unstable orbit on, so that no stable part is cut.
     """
     if "closed" not in (up.ended, down.ended):
         return up.row.after(down.row), (down.ended, up.ended)
@@ -179,7 +176,7 @@ def _joined(problem: ContinuationProblem, up: Path, down: Path) -> tuple[Points,
 
 
 def described(problem: ContinuationProblem, rows: Sequence[tuple[Points, tuple[str, str]]]) -> list[Branch]:
-    """Return branches from their points and ends, with the bifurcations of all located at the same time."""
+    """Return branches from their points and ends, after locating the bifurcations of all at the same time."""
     found = bifurcations_of(problem, [points for points, _ in rows])
     return [_branch(problem, *row, ended) for row, (_, ended) in zip(found, rows, strict=True)]
 
@@ -187,7 +184,7 @@ def described(problem: ContinuationProblem, rows: Sequence[tuple[Points, tuple[s
 def _branch(problem: ContinuationProblem, points: Points, places: Sequence[Place], ended: tuple[str, str]) -> Branch:
     stable = problem.unstable(points) == 0
     before = [place.after for place in places]
-    # Of several between two points, only the outer ones are next to orbits whose stability is known.
+    # If several lie between two points, only the outer ones are next to an orbit of known stability.
     outer = lambda i, k: (stable[k] and k not in before[:i]) or (stable[k + 1] and k not in before[i + 1 :])
     special = [_point(problem, place, bool(outer(i, place.after))) for i, place in enumerate(places)]
     value = problem.values(points.u)[:, 0]
@@ -230,11 +227,11 @@ def _point(problem: ContinuationProblem, place: Place, edge: bool) -> Point:
 
 @dataclasses.dataclass(frozen=True)
 class Cascade:
-    """Period doublings of orbits of period 1, 2, 4, ... times the first one's, and where they accumulate [SI].
+    """Successive period doublings of an orbit, and the parameter value at which they accumulate [SI].
 
-    The limit is extrapolated with Feigenbaum's ratio, and NaN with fewer than two points. Its error is the distance of
-    the last two extrapolations and the errors of the last two points, and infinite with fewer than three. `ended` says
-    why there are not as many points as were asked for.
+    The limit is extrapolated with Feigenbaum's ratio, and NaN with fewer than two points. Its error is the difference
+    of the last two extrapolations plus the weighted errors of the last two points, and infinite with fewer than three.
+    `ended` is the reason if there are fewer points than requested.
     """
 
     points: tuple[Point, ...]
@@ -244,11 +241,11 @@ class Cascade:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """Values of the parameter [SI]."""
+        """Parameter values at the period doublings [SI]."""
         return tuple(float(p.value) for p in self.points)
 
     def as_edge(self, kind: str) -> Edge:
-        """Return the limit, of a cascade over speed, as the edge of a chaotic zone."""
+        """Return the limit of a cascade over speed as the edge of a chaotic zone."""
         return Edge(self.limit * 30 / np.pi, self.error * 30 / np.pi, kind, "period-doubling", "cascade")
 
     def __str__(self) -> str:
@@ -272,12 +269,12 @@ def cascade(
     levels: int = 4,
     method: AbstractMethod | None = None,
 ) -> Cascade:
-    """Follow a period-doubling cascade: each doubled branch from its beginning to its own first period doubling.
+    """Follow a period-doubling cascade: each doubled branch up to its own first period doubling.
 
-    **Arguments:** system; first point, the doubling of an orbit of any period; parameter and its range [SI]; number of
+    **Arguments:** system; first period doubling, of an orbit of any period; parameter and its range [SI]; number of
     doublings; integration method.
 
-    **Raises:** `ValueError` for a point that is no period doubling, or was not found.
+    **Raises:** `ValueError` for a point that is not a period doubling, or was not found.
     """
     require_x64()
     if point.kind != "period-doubling":
@@ -304,10 +301,8 @@ def cascade(
 
 
 def _doubled(problem: ContinuationProblem, point: Point, amplitude: float) -> Branch | None:
-    """Follow the branch of orbits of twice the period from a period doubling to its own first one, if it is found.
-
-    It is entered at a distance of `amplitude` along the critical direction, in units of the system's scale.
-    """
+    """Follow the doubled branch from `amplitude` (in units of the scale) along the critical direction to its own first
+    period doubling; None if no branch is found."""
     at, periods = float(point.value), int(point.periods)
     problem, half = problem.around(at, 2 * periods), problem.around(at, periods)
     test = lambda points: test_functions(problem.multipliers(points))["period-doubling"]
@@ -317,8 +312,8 @@ def _doubled(problem: ContinuationProblem, point: Point, amplitude: float) -> Br
     while amplitude > SMALLEST_AMPLITUDE:
         start = first_points(problem, u + amplitude * across, across, int(point.steps))
         near = start.converged[0] and abs(start.u[0, -1] - u[0, -1]) < 1.0
-        once = correct(half, start.u, across, start.steps, ONCE)  # where it is half of its revolutions later
-        away = np.linalg.norm(once.jacobian[0] @ (start.u - once.u)[0])  # nothing if it is the orbit that doubles
+        once = correct(half, start.u, across, start.steps, ONCE)  # one Newton step with half the period
+        away = np.linalg.norm(once.jacobian[0] @ (start.u - once.u)[0])  # zero on the branch of half the period
         if near and test(start)[0] > 0 and away > amplitude:
             doubles: Event = lambda path: "stopped" if test(path.points[-1]) < 0 else ""
             (path,) = Continuation(problem, start, StepControl(first=0.01), (doubles,)).finished()

@@ -1,9 +1,9 @@
-"""Pseudo-arclength continuation of curves of solutions, many at a time: an iterator over (problem, points).
+"""Pseudo-arclength continuation of many curves of solutions at a time, as an iterator over (problem, points).
 
-A curve R(u) = 0 with one unknown more than equations is followed through folds and whatever the stability: the step
-control predicts a point, the corrector finds the point of the curve on the plane through it, and events end the curve.
-Each of the three is an argument of `Continuation`. Every curve has its own step length and number of steps per
-revolution; corrections of all curves run in chunks of one compiled program on all cores.
+A curve R(u) = 0 with one more unknown than equations is followed through folds, whether stable or not: the step control
+predicts a point, the corrector finds the point of the curve on the plane through it, and events end the curve. Each of
+the three is an argument of `Continuation`. Every curve has its own step length and number of steps per revolution;
+corrections of all curves run in chunks of one compiled program on all cores.
 """
 
 import concurrent.futures
@@ -28,17 +28,17 @@ from .point import eigenvalues
 from .problem import GIVEN_UP, SETTLED, SPEED, Counts, Given, Parameter, by_rodas4, by_steps, counted, make_problem
 
 
-CHUNK = 8  # points per call: up to eight cost what one does, since they share the processor's instructions
-FOLLOWING, OF_A_STEP = 1e-6, 1e-5  # Newton's last step, in the unknowns' units, or over a shorter step's length
+CHUNK = 8  # points per call: up to eight cost as much as one, since they share vector instructions
+FOLLOWING, OF_A_STEP = 1e-6, 1e-5  # tolerance of Newton's method in the unknowns' units, and relative to a short step
 ONCE = 1e300  # tolerance for a single step of Newton's method; infinity would give NaN where an unknown is zero
 CORRECTIONS = 8
-LOOSE = 10.0  # errors may be larger than allowed by this factor
-COARSER = 100.0  # half as many steps per revolution are taken if errors are smaller than that by this factor
-MOVED = 0.1  # largest change by half the steps over the step's length: with more, the curve may be the steps' error
+LOOSE = 10.0  # errors may exceed the tolerance by this factor during continuation
+COARSER = 100.0  # the steps per revolution are halved if errors are this factor below that limit
+MOVED = 0.1  # largest change on halving the steps, over the step's length; a larger one may make the curve an artefact
 CROSSED, ASIDE = 1e-4, 0.01
-"""A step across which the orientation changes is halved down to the first length. If it changes all the same the curve
-crosses another one, and is left by one step from the second distance before the crossing, near which tangents are lost
-to rounding."""
+"""A step across which the orientation changes is halved down to the first length. If it still changes, the curve
+crosses another one there, and one step leads across from the second distance before it, as tangents are lost to
+rounding nearer to the crossing."""
 Start = tuple[np.ndarray, float]
 """A state [SI] and the value of the parameter."""
 
@@ -68,18 +68,18 @@ class ContinuationProblem(eqx.Module):
         return np.asarray(self.equations.problem.scale)
 
     def around(self, at: Any, periods: Any = None) -> "ContinuationProblem":
-        """Return the problem of orbits in the system's scale at a value of the parameter, for other `periods`."""
+        """Return the problem of orbits in the system's scale at a value of the parameter, with `periods` if given."""
         mine, there = self.equations.problem, self.given.changed(self.parameter, jnp.asarray(at, dtype=float))
         periods = mine.periods if periods is None else periods
         problem = make_problem(there, mine.parameters, mine.units, periods, mine.method)
         return dataclasses.replace(self, equations=OrbitEquations(problem))
 
     def by_rodas4(self) -> "ContinuationProblem":
-        """Return the problem with Rodas4 and as many steps as are needed."""
+        """Return the problem with Rodas4, which chooses its number of steps."""
         return eqx.tree_at(lambda p: (p.equations.problem.method, p.counts), self, by_rodas4())
 
     def with_stable_steps(self, start: Start) -> "ContinuationProblem":
-        """Return the problem itself or, if it chooses its steps and Runge-Kutta's are not stable, one with Rodas4."""
+        """Return the problem, with Rodas4 if it chooses its steps and Runge-Kutta is unstable at `start`."""
         if not self.counts.chooses or np.all(np.isfinite(self.around(start[1]).orbits_near([start]).jacobian)):
             return self
         return self.by_rodas4()
@@ -90,7 +90,7 @@ class ContinuationProblem(eqx.Module):
         return first_points(self, u, np.eye(1, u.shape[1], u.shape[1] - 1).repeat(len(u), axis=0), likely=likely)
 
     def unknowns(self, state: Any, *values: float) -> np.ndarray:
-        """Return the unknowns of a state and of the parameters' values [SI]."""
+        """Return the unknowns for a state and the parameters' values [SI]."""
         return np.array([*(np.asarray(state) / self.scale), *(np.array(values) / self.units)])
 
     def states(self, u: np.ndarray) -> np.ndarray:
@@ -102,12 +102,11 @@ class ContinuationProblem(eqx.Module):
         return u[..., self.scale.size :] * self.units
 
     def inside(self, u: np.ndarray) -> bool:
-        """Return whether the parameters of a point are within the range."""
         values = self.values(u)
         return bool(np.all((self.lower < values) & (values < self.upper)))
 
     def require_inside(self, name: str, at: float) -> None:
-        """**Raises:** `ArgumentError` for a first point outside the range of the first parameter."""
+        """Raise `ArgumentError` for a first point outside the range of the first parameter."""
         lower, upper = self.lower[0], self.upper[0]
         slack = 1e-9 * max(abs(lower), abs(upper))  # speeds in rpm are rounded
         if not lower - slack <= at <= upper + slack:
@@ -119,14 +118,14 @@ class ContinuationProblem(eqx.Module):
         return eigenvalues(self.equations.monodromy(points))
 
     def unstable(self, points: Points, circle: float = 1.0) -> Any:
-        """Return how many multipliers of each orbit are outside a circle."""
+        """Return the number of multipliers of each orbit outside a circle of radius `circle`."""
         return np.sum(~(np.abs(self.multipliers(points)) < circle), axis=-1)
 
 
 def orbit_curves(
     given: Given, parameter: Parameter, lower: float, upper: float, method: AbstractMethod | None, periods: int = 1
 ) -> ContinuationProblem:
-    """Return the problem of the branches of orbits over a parameter, in the system's scale at the given speed.
+    """Return the problem of branches of orbits over a parameter, in the system's scale at the given speed.
 
     **Raises:** `ArgumentError` for a range in which the parameter cannot be followed.
     """
@@ -147,7 +146,7 @@ def orbit_curves(
 def _correct(
     equations: AbstractEquations, given: Any, at: Array, normal: Array, tolerance: Array, steps: Array, measured: Array
 ) -> Points:
-    """Return the point and, if `measured`, what one step of Newton's method with half the steps makes of it."""
+    """Return the point and, if `measured`, its image under one step of Newton's method with half the steps."""
 
     def solved(plane: tuple[Array, Array], half: Array) -> tuple[tuple[Array, Array], Points]:
         at, normal = plane
@@ -183,13 +182,13 @@ def correct(
 ) -> Points:
     """Find the points of curves on planes across them by Newton's method.
 
-    **Arguments:** problem; points of the planes and their normals; steps per revolution of each; Newton's last step, of
-    all or each; whether errors are wanted too, by one step of Newton's method with half the steps.
+    **Arguments:** problem; points of the planes and their normals; steps per revolution of each; tolerance of Newton's
+    method, of all or each; `measured`, to estimate errors by one step of Newton's method with half the steps.
     """
     measured = measured and int(problem.counts.last) > 1
     tolerance = np.broadcast_to(np.asarray(tolerance, dtype=float), len(at))
     chunks = []
-    for count in np.unique(steps):  # points by as many steps run together
+    for count in np.unique(steps):  # points with the same number of steps run together
         mine = np.flatnonzero(steps == count)
         chunks += [mine[np.minimum(np.arange(i, i + CHUNK), mine.size - 1)] for i in range(0, mine.size, CHUNK)]
 
@@ -212,7 +211,7 @@ def correct(
 
 
 def in_parallel(f: Callable[[Any], Any], each: Sequence[Any]) -> list[Any]:
-    """Return f of each, on all cores."""
+    """Return f(x) for each x, evaluated on all cores."""
     if len(each) == 1:
         return [f(each[0])]
     with concurrent.futures.ThreadPoolExecutor(cores()) as pool:
@@ -226,10 +225,8 @@ def first_points(
     steps: int = 0,
     likely: np.ndarray | None = None,
 ) -> Points:
-    """Find points of curves on planes across them, each by as many steps as it needs, and by `steps` or more.
-
-    If the first number of steps finds nothing, more are tried only for points that are `likely`, by default all.
-    """
+    """Find points of curves on planes across them, each with as many steps as it needs, at least `steps`; if the first
+    number of steps finds nothing, more are tried only for points that are `likely`, by default all."""
     counts = problem.counts
     first = int(counts.first if counts.chooses else counts.last)
     likely = np.ones(len(at), dtype=bool) if likely is None else likely
@@ -247,7 +244,7 @@ def first_points(
 def solved_again(
     problem: ContinuationProblem, row: Points, which: np.ndarray, steps: np.ndarray, corrector: Callable = correct
 ) -> Points:
-    """Return the points with some solved for once more by these steps, if that succeeds."""
+    """Return the points with those at `which` solved for again with other steps, if that succeeds."""
     if not which.size:
         return row
     got = corrector(problem, row.u[which], row.tangent[which], steps)
@@ -260,9 +257,8 @@ def solved_again(
 
 @dataclasses.dataclass
 class Path:
-    """A curve while it is followed: its points, the length of its next step, its steps per revolution, its number, and
-    why it ended, empty while it has not (see `Branch.ended`). `crosses` allows the next point to be beyond a crossing.
-    """
+    """State of a curve during continuation: points, length of the next step, `steps` per revolution, number, and reason
+    why it `ended` (see `Branch.ended`), empty if it has not; if `crosses`, the next point may be beyond a crossing."""
 
     points: list[Points]
     length: float
@@ -273,11 +269,10 @@ class Path:
 
     @property
     def row(self) -> Points:
-        """All points."""
         return Points.stacked(self.points)
 
     def passes(self, places: Float[np.ndarray, "places n"]) -> bool:
-        """Return whether the last step goes through one of some places, to the accuracy of the chord."""
+        """Return True if the last step goes through any of these places, to the accuracy of the chord."""
         begin, step = self.points[-2].u, self.points[-1].u - self.points[-2].u
         share = (places - begin) @ step / np.dot(step, step)
         off = np.linalg.norm(begin + share[:, None] * step - places, axis=1)
@@ -285,7 +280,7 @@ class Path:
 
 
 Event = Callable[[Path], str]
-"""Returns why a curve ends with its last point, or an empty text."""
+"""Function that returns the reason why a curve ends at its last point, or an empty string."""
 
 
 def closes(path: Path) -> str:
@@ -298,12 +293,12 @@ def closes(path: Path) -> str:
 class Continuation:
     """Iterator that takes one step along each curve, and returns the curves that have a new point.
 
-    A point whose error is too large is refused: the revolutions get twice as many steps, the last point is solved for
-    again by these, and the step along the curve is repeated. If the error is small they get half as many.
+    A point whose error is too large is rejected: the steps per revolution are doubled, the last point is solved for
+    again, and the step along the curve is repeated. If the error is small the steps per revolution are halved.
 
-    **Arguments:** problem, which may be replaced between two steps; first points, each to be followed in the direction
-    of its tangent; step control; further events; corrector; whether the equations keep their orientation along a curve,
-    which they do not if the problem is replaced.
+    **Arguments:** problem, which may be replaced between two steps; first points, each followed in the direction of its
+    tangent; step control; further events; corrector; `oriented`, True if the equations keep their orientation along a
+    curve, which they do not if the problem is replaced.
     """
 
     def __init__(
@@ -327,7 +322,7 @@ class Continuation:
         ]
 
     def finished(self) -> list[Path]:
-        """Take all steps, and return the curves."""
+        """Take all steps and return the curves."""
         for _ in self:
             pass
         return self.curves
@@ -340,7 +335,7 @@ class Continuation:
         if not active:
             raise StopIteration
         changed = [c for c in active if c.steps != c.points[-1].steps]
-        if changed:  # the last points are solved for again, by the steps that hold now
+        if changed:  # solve for the last points again with the present number of steps
             last, steps = Points.stacked([c.points[-1] for c in changed]), np.array([c.steps for c in changed])
             last = solved_again(self.problem, last, np.arange(len(changed)), steps, self.corrector)
             for i, c in enumerate(changed):
@@ -353,7 +348,7 @@ class Continuation:
         got = self.corrector(self.problem, ahead, normal, steps, closely, measured=True)
         unknown = np.flatnonzero(
             self.chooses & got.converged & (steps >= self.most) & ~(got.error <= SETTLED)
-        )  # because of the steps, or of Newton's last step
+        )  # too few steps per revolution, or too large a tolerance of Newton's method
         if unknown.size:
             closer = self.corrector(self.problem, got.u[unknown], normal[unknown], steps[unknown], measured=True)
             got = got.put(unknown, closer)
@@ -362,7 +357,7 @@ class Continuation:
         ]
 
     def _advances(self, curve: Path, new: Points, ahead: np.ndarray, normal: np.ndarray, unknown: bool) -> bool:
-        """Accept a new point or refuse it, and choose the next step."""
+        """Accept or reject a new point, and choose the next step; return True if it is accepted."""
         control, length = self.control, curve.length
         step = control.compare(curve.points, new, ahead, normal, length)
         same = step.same or not self.oriented

@@ -1,8 +1,8 @@
-"""Bifurcation points followed in two parameters: curves of a stability map, and edges from one design to another.
+"""Continuation of bifurcation points in two parameters: curves of a stability map, and edges from design to design.
 
-From one design to another the two parameters are the speed and the share of the way on the straight line between the
-designs, so that an edge that turns back in the design is followed round the turn. The predictor has the full tangent of
-state, speed and share by the implicit function theorem, and so the orbit moves with its land.
+Between two designs the parameters are the speed and the position on the straight line from one design to the other, so
+that an edge is followed round a fold in the design. The predictor uses the full tangent of state, speed and position by
+the implicit function theorem, so that the orbit follows a contact that moves with the design.
 """
 
 import dataclasses
@@ -35,7 +35,7 @@ LONGEST, SHORTEST, MOST = 1.5, 1e-6, 80
 """Longest and shortest step, in clearances and tenths of the speed and of the largest relative change; most steps."""
 LEAST = 1e-10  # designs that differ by less are the same up to rounding
 SAME_EDGE = 2e-3
-"""Largest relative distance of the edge by its final equations from the end of its curve."""
+"""Largest relative distance between the end of the curve and the edge solved for at the new design."""
 WALK = StepControl(first=0.05, longest=0.25, most=200)  # in units of 1/20 of the ranges and of the system's scale
 
 
@@ -43,8 +43,9 @@ WALK = StepControl(first=0.05, longest=0.25, most=200)  # in units of 1/20 of th
 class Curve:
     """Bifurcation points of one kind over two parameters [SI], in order along the curve.
 
-    A curve of Neimark-Sacker bifurcations is not `genuine` where it goes on as neutral saddles. `ended` is as in
-    `Branch`. `error` is the distance in x, or in y in the same share of its range, to the curve by half the steps.
+    `genuine` is False where a curve of Neimark-Sacker bifurcations continues as neutral saddles. `ended` is as in
+    `Branch`. `error` is the distance to the curve computed with half the steps, in units of x; in y it is the same
+    fraction of the range.
     """
 
     kind: str
@@ -80,14 +81,14 @@ def curve(
     name: str = "",
     method: AbstractMethod | None = None,
 ) -> Curve:
-    """Follow a bifurcation point both ways in two parameters.
+    """Follow a bifurcation point in both directions in two parameters.
 
     **Arguments:**
 
     - `point`: a period doubling, Neimark-Sacker bifurcation or fold with `x` as its parameter, from a branch or
         `bifurcation`.
     - `x`, `y`: the two parameters, by name.
-    - `lower`, `upper`, `x_lower`, `x_upper`: the range of `y` and of `x` [SI]; the curve ends where it leaves them.
+    - `lower`, `upper`, `x_lower`, `x_upper`: ranges of `y` and of `x` [SI]; the curve ends where it leaves them.
 
     **Raises:** `ValueError` if Newton's method does not find the point again, or for a kind that cannot be followed.
     """
@@ -129,7 +130,7 @@ def _point_curve(
     second: float,
     method: AbstractMethod | None,
 ) -> tuple[ContinuationProblem, Points]:
-    """Return the problem of the curve through a bifurcation point over two parameters, and its first point.
+    """Return the problem of the curve through a bifurcation point, and its first point.
 
     **Arguments:** system; parameters, their units and limits [SI]; the point, and its value of the second parameter.
     """
@@ -145,7 +146,7 @@ def _point_curve(
 
 
 def _followed(problem: ContinuationProblem, start: Points, steps: StepControl) -> Path:
-    """Follow a curve of bifurcation points in the direction of its first tangent, until it leaves its limits."""
+    """Follow a curve of bifurcation points in the direction of its first tangent."""
     walk = Continuation(problem, start, steps, oriented=False)
     for advanced in walk:
         for one in advanced:  # borders from the null vectors at the last point keep the equations far from singular
@@ -157,7 +158,7 @@ def _followed(problem: ContinuationProblem, start: Points, steps: StepControl) -
 
 
 def _is_on_circle(multipliers: np.ndarray) -> bool:
-    """Return whether the two multipliers whose product is closest to 1 are a complex pair and no neutral saddle."""
+    """Return True if the two multipliers whose product is closest to 1 are a complex pair, not a neutral saddle."""
     one, other = min(itertools.combinations(multipliers, 2), key=lambda pair: abs(pair[0] * pair[1] - 1))
     return bool(abs((one + other).real / 2) <= 1)
 
@@ -166,7 +167,7 @@ def _is_on_circle(multipliers: np.ndarray) -> bool:
 
 
 class Between(Given):
-    """A system on the straight line between two designs; the parameter `share` is 0 at the first and 1 at the other."""
+    """A system on the straight line between two designs: `share` is 0 at the first and 1 at the second."""
 
     other: AbstractForcedSystem
 
@@ -178,13 +179,13 @@ class Between(Given):
 
 
 class Followed(NamedTuple):
-    """An edge after a change of design, or why there is none.
+    """An edge after a change of design, or the reason why it no longer exists.
 
     - `edge`: the edge with its derivatives, None if it was lost.
     - `ended`: empty; `turned back`, the edge met another one before the change was complete and both vanished;
-        `left the range` of speed; `neutral saddle`, the pair of multipliers of a Neimark-Sacker bifurcation is real
-        there, so that nothing bifurcates; `lost`, continuation found no further point.
-    - `share`: how far along the change the edge existed, 1 if it reached the new design.
+        `left the range` of speed; `neutral saddle`, the critical multipliers of a Neimark-Sacker bifurcation are real
+        at the new design, so that nothing bifurcates; `lost`, continuation found no further point.
+    - `share`: fraction of the change up to which the edge exists, 1 if it reached the new design.
     """
 
     edge: Sensitivity | None
@@ -207,7 +208,7 @@ def follow(
     **Arguments:** design; a period doubling, Neimark-Sacker bifurcation or fold over speed that was found there; new
     design, of the same kind of model; range of speed [rad/s] within which the edge is followed.
 
-    **Returns:** the edge at the new design with its exact derivatives, or why it is not there.
+    **Returns:** the edge at the new design with its exact derivatives, or the reason why there is none.
     """
     require_x64()
     a, b = (np.array([float(x) for x in parameters(m).values()]) for m in (system, other))
@@ -236,7 +237,7 @@ def follow(
 
 
 def _landed(problem: ContinuationProblem, row: Points, share: np.ndarray, point: Point) -> Point:
-    """Return the point of a curve at the new design, by a cubic through its last two points and their tangents."""
+    """Return the point at the new design, by a cubic through a curve's last two points and their tangents."""
     (a, b), (sa, sb) = row.take(slice(-2, None)).u, share[-2:]
     da, db = (t * (sb - sa) / (t[-1] * problem.units[1]) for t in row.tangent[-2:])
     s = (1 - sa) / (sb - sa)
@@ -246,7 +247,7 @@ def _landed(problem: ContinuationProblem, row: Points, share: np.ndarray, point:
 
 
 def _solved(system: AbstractForcedSystem, point: Point, name: str, method: AbstractMethod | None) -> Followed:
-    """Return the edge by its equations at the new design alone."""
+    """Solve for the edge at the new design."""
     edge = sensitivity(system, point, name, method)
     if edge.status == "other kind":
         return Followed(None, "neutral saddle")
@@ -261,7 +262,7 @@ def follow_all(
     limits: tuple[float, float],
     method: AbstractMethod | None = None,
 ) -> dict[str, Followed]:
-    """Return what became of each edge at another design; edges run on all cores."""
+    """Follow each edge to another design, on all cores."""
     lower, upper = limits
     one = lambda name: follow(system, points[name], other, lower=lower, upper=upper, name=name, method=method)
     return dict(zip(points, in_parallel(one, list(points)), strict=True)) if points else {}

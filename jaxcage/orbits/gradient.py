@@ -1,9 +1,9 @@
 """Gradients of edges and of multipliers: derivatives, elasticities, and the identities that they must satisfy.
 
-An edge speed w is a rate. Whatever the units of mass, length and time, the same physics must come out, so that with the
-exponents a_i of a unit in every parameter p_i
+An edge speed w is a rate, and must not depend on the units of mass, length and time. With the exponents a_i of a unit
+in every parameter p_i,
     sum a_i p_i dw/dp_i = 0 for mass and length, = -w for time.
-These hold for every kind of edge and test a gradient without any reference.
+These identities hold for every kind of edge and test a gradient without any reference.
 
 All derivatives follow from the equations of an edge or of an orbit by the implicit function theorem (`newton.as_root`).
 """
@@ -43,10 +43,10 @@ class Sensitivity:
     """Derivatives of an edge, or of the width between two edges, with respect to every parameter.
 
     `derivative` is d value [rpm] / d parameter [SI], `elasticity` the relative change of the value over that of the
-    parameter, and `homogeneity` holds the relative residuals of the identities for mass, length and time, NaN if a
+    parameter, and `homogeneity` the relative residuals of the identities for mass, length and time, NaN if a
     parameter's unit is not known. `transversality` is d|mu|/d speed [s] (see `Point`), for a width or a limit the
-    smallest one; `error_rpm` is the distance of the value to that by half the `steps` per revolution. The `state` of
-    the orbit at phase 0 [SI] is None for a width or a limit.
+    smallest one; `error_rpm` is the change of the value when the `steps` per revolution are halved. The `state` of the
+    orbit at phase 0 [SI] is None for a width or a limit.
     """
 
     name: str
@@ -64,12 +64,12 @@ class Sensitivity:
 
     @property
     def trusted(self) -> bool:
-        """Whether the value is a function of the design here."""
+        """True if the edge was found and its value is a differentiable function of the design."""
         return self.status == "converged"
 
     @property
     def bounds(self) -> bool:
-        """Whether a stable orbit ends here: no multiplier but the critical ones is outside the unit circle."""
+        """True if a stable orbit ends here: only critical multipliers are on or outside the unit circle."""
         if self.multipliers is None:
             return False
         critical = 2 if self.kind == "Neimark-Sacker" else 1
@@ -99,10 +99,10 @@ def _pull_back(equations: PointEquations, given: Given, u: Array) -> AbstractFor
 def sensitivity(
     system: AbstractForcedSystem, point: Point, name: str = "edge", method: AbstractMethod | None = None
 ) -> Sensitivity:
-    """Return the derivatives of an edge speed with respect to every parameter, exact for the equations as integrated.
+    """Return the derivatives of an edge speed with respect to every parameter, exact for the discretised equations.
 
-    Newton's method locates the point first, and again with twice the steps until it no longer moves. `bifurcation`
-    gives the same derivatives, and higher ones.
+    Newton's method first locates the point, doubling the steps until it no longer moves. `bifurcation` gives the same
+    derivatives, and higher ones.
 
     **Arguments:** a system whose parameters are declared, such as `CageModel`; a bifurcation over speed, located.
 
@@ -110,9 +110,7 @@ def sensitivity(
     finds a neutral saddle instead of a Neimark-Sacker bifurcation, or finds it elsewhere with half the steps.
     """
     require_x64()
-    if point.kind not in get_args(
-        Kind
-    ):  # a branch point is there for the symmetry alone, and no function of the design
+    if point.kind not in get_args(Kind):  # a branch point exists only by symmetry, and is not a function of the design
         return _nowhere(system, point.kind, name)
     given = Given(system, jnp.asarray(point.speed, dtype=float))
     begin = Start(jnp.asarray(point.state), given.speed, given.speed)
@@ -148,7 +146,6 @@ def sensitivity(
 def _nowhere(
     system: AbstractForcedSystem, kind: str, name: str, status: str = "no such point", error_rpm: float = float("nan")
 ) -> Sensitivity:
-    """Return the result for an edge that was not found again, or elsewhere."""
     nan = float("nan")
     row = dict.fromkeys(parameter_paths(system), nan)
     broken: dict[str, float] = dict.fromkeys(("mass", "length", "time"), nan)
@@ -158,7 +155,7 @@ def _nowhere(
 def sensitivities(
     system: AbstractForcedSystem, points: Mapping[str, Point], method: AbstractMethod | None = None
 ) -> dict[str, Sensitivity]:
-    """Return the sensitivity of each named edge; edges run on all cores."""
+    """Return the sensitivity of each named edge, computed on all cores."""
     require_x64()
     found = in_parallel(lambda name: sensitivity(system, points[name], name, method), list(points))
     return dict(zip(points, found, strict=True))
@@ -167,9 +164,9 @@ def sensitivities(
 def limit_sensitivity(
     system: AbstractForcedSystem, cascade: Cascade, name: str = "limit", method: AbstractMethod | None = None
 ) -> Sensitivity:
-    """Return the sensitivity of the speed at which a cascade accumulates, extrapolated like that speed itself.
+    """Return the sensitivity of the speed at which a cascade accumulates, extrapolated in the same way as the speed.
 
-    **Raises:** `ValueError` for a cascade over another parameter than speed, or of fewer than two points.
+    **Raises:** `ValueError` for a cascade over a parameter other than speed, or of fewer than two points.
     """
     if len(cascade.points) < 2 or any(p.parameter != SPEED for p in cascade.points):
         raise ArgumentError("cascade", said=f"must have two points over speed, but has {len(cascade.points)}.")
@@ -201,8 +198,7 @@ def _combined(name: str, kind: str, parts: Sequence[tuple[float, Sensitivity]]) 
 
 
 class OrbitSlopes(NamedTuple):
-    """The size of the largest multiplier of an orbit, its derivatives by design variables, shape (n,), and those of the
-    state at phase 0 [SI], shape (dim, n)."""
+    """Modulus of an orbit's largest multiplier, and derivatives of it and of the state [SI] by n design variables."""
 
     multiplier: float
     multiplier_slope: Float[np.ndarray, " n"]
@@ -213,7 +209,7 @@ class OrbitSlopes(NamedTuple):
 def _moves(
     equations: OrbitEquations, orbit: Orbit, designs: Callable[[Array], AbstractForcedSystem], place: Array
 ) -> tuple[Array, tuple[Array, Array]]:
-    """Return |mu| of the largest multiplier, and its derivatives and those of the state by the design variables."""
+    """Return |mu| of the largest multiplier, and the derivatives of |mu| and of the state by the design variables."""
     problem = equations.problem
 
     def orbit_of(place: Array) -> tuple[tuple[Array, Array], Array]:
@@ -229,10 +225,11 @@ def _moves(
 def orbit_slopes(
     designs: Callable[[Array], AbstractForcedSystem], at: Float[np.ndarray, " n"], orbit: Orbit
 ) -> OrbitSlopes:
-    """Return how an orbit and its largest multiplier change with the design, by the implicit function theorem.
+    """Return the derivatives of an orbit and its largest multiplier by the design, by the implicit function theorem.
 
-    **Arguments:** the system as a function of design variables, a module; the values of these at which `orbit` was
-    found. If two multipliers are equal in size, one of them is taken.
+    If two multipliers have the same modulus, one of them is taken.
+
+    **Arguments:** module that maps design variables to a system; their values at `orbit`; the orbit.
     """
     place = jnp.asarray(at, dtype=float)
     given = Given(designs(place), jnp.asarray(orbit.speed, dtype=float))

@@ -1,7 +1,7 @@
-"""Bifurcations along a branch: seen between neighbouring orbits, located, and compared with the changes of stability.
+"""Bifurcations along a branch: detected between neighbouring orbits, located, and checked against stability changes.
 
-The Illinois variant of regula falsi locates them: the functions that vanish there are evaluated at orbits of the branch
-itself, on planes across the chord between two ends. All places are located at the same time.
+The Illinois variant of regula falsi locates them: test functions are evaluated at orbits of the branch itself, on
+planes across the chord between two orbits. All bifurcations are located at the same time.
 """
 
 import dataclasses
@@ -19,25 +19,25 @@ from .point import COMPLEX, UNEXPLAINED, critical_of, test_functions, to_critica
 from .problem import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
 
 
-WIDER = (0, 1, 3)  # a bifurcation that is not where it was seen is looked for this many orbits further out
-BESIDE = 0.02  # by other steps it is first looked for this close to where it was, over the length between the orbits
-PART = 1e-3  # it is refined until it moves by this part of its last move
+WIDER = (0, 1, 3)  # orbits by which the bracket is widened if the bifurcation is not where it was detected
+BESIDE = 0.02  # half-width of the first bracket with other steps, over the distance between the two orbits
+PART = 1e-3  # it is refined until it moves by this fraction of its last move
 CLEAR = 1e-4  # orbits with a multiplier this close to the unit circle are not counted as stable or unstable
 HALVINGS, APART = 20, 1e-7  # most halvings of a step, and the length below which it is not halved
-NEARLY = 0.1  # allowed error of a parabola: of its extremum over the function's change, of its place over a step
-SUNK = 0.75  # a parabola that puts the extremum below this part of the lesser end is not accurate about the rest
-LOOKED = 1e-4  # shorter steps are not halved because of a parabola: where orbits cross, the functions are rounding
-STEEP = 30.0  # a steeper map may have another derivative at the orbit than at Newton's last iterate before
+NEARLY = 0.1  # allowed error of a parabola: its extremum over the function's change, its position over a step
+SUNK = 0.75  # an extremum below this fraction of the smaller end value is too low for the parabola to be trusted
+LOOKED = 1e-4  # shorter steps are not halved because of a parabola: where orbits cross, test functions are rounding
+STEEP = 30.0  # norm above which the derivative at Newton's last iterate may differ from that at the orbit
 MOST_ITERATIONS = 40
 LOCATED, BRACKETED = 1e-9, 1e-5  # accuracy of places; of branch points, where the curve's equations are singular
 
 
 @dataclasses.dataclass
 class Place:
-    """A bifurcation of some kind in a row of orbits, after one of them; `point` is None if it was not found.
+    """A bifurcation in a row of orbits, between orbit `after` and the next; `point` is None if it was not found.
 
-    It is looked for by so many `steps` per revolution, close to where it was to the accuracy `within`. `error` is its
-    distance to the place by half the steps, and `moved` the expected one by other steps, both in the unknowns' units.
+    It is located with `steps` per revolution to the accuracy `within`. `error` is the change when the steps are halved,
+    and `moved` the expected change with other steps, both in the unknowns' units.
     """
 
     row: Points
@@ -50,8 +50,7 @@ class Place:
     within: float = LOCATED
 
     def ends(self, beyond: int | None) -> Points | None:
-        """Return points on both sides: orbits, so many further out, or close to where it was found; None if it was
-        not."""
+        """Return points on both sides: orbits, `beyond` ones further out, or (None) points about the last location."""
         if beyond is not None:
             return self.row.take([max(self.after - beyond, 0), min(self.after + 1 + beyond, len(self.row.u) - 1)])
         if self.point is None:
@@ -63,9 +62,10 @@ class Place:
 def bifurcations_of(problem: ContinuationProblem, rows: Sequence[Points]) -> list[tuple[Points, list[Place]]]:
     """Return the orbits of branches, and their bifurcations in order; between any two there is an orbit.
 
-    If the number of unstable multipliers changes otherwise than by what was seen, as when two real multipliers pass -1
-    within a step, the step is halved. If it changes otherwise than by what was located, its orbits are solved for again
-    and bifurcations located once more. The rest is of the kind `unexplained`: the curve may not be a branch there.
+    If the number of unstable multipliers changes in a way that the detected bifurcations do not explain, as when two
+    real multipliers pass -1 within a step, the step is halved. If the located bifurcations do not explain it, the
+    orbits are solved for again and the bifurcations located once more. A change that is still not explained has the
+    kind `unexplained`: the curve may not be a branch there.
     """
     steep = [np.flatnonzero(np.max(np.abs(row.jacobian), axis=(1, 2)) > STEEP) for row in rows]
     at_root = [solved_again(problem, row, k, row.steps[k]) for row, k in zip(rows, steep, strict=True)]
@@ -92,7 +92,7 @@ def bifurcations_of(problem: ContinuationProblem, rows: Sequence[Points]) -> lis
 
 
 def _with_finer_steps(problem: ContinuationProblem, row: Points, gaps: Sequence[tuple[int, int]]) -> Points:
-    """Return the orbits with those around the gaps solved for again, in each gap by twice the largest steps."""
+    """Return the orbits with those around each gap solved for again, with twice the largest number of steps there."""
     for a, b in gaps:
         near = np.arange(max(a - 1, 0), min(b + 2, len(row.u)))
         steps = np.full(near.size, min(2 * int(row.steps[near].max()), int(problem.counts.last)))
@@ -103,7 +103,7 @@ def _with_finer_steps(problem: ContinuationProblem, row: Points, gaps: Sequence[
 def _with_middles(
     problem: ContinuationProblem, row: Points, after: np.ndarray, one: Points, other: Points
 ) -> tuple[Points, np.ndarray]:
-    """Return the orbits with further ones `after` these, halfway from `one` to `other`; and which were found."""
+    """Insert orbits `after` these, halfway from `one` to `other`; also return which were found."""
     chord = other.u - one.u
     length = np.linalg.norm(chord, axis=1)
     middle, normal = one.u + chord / 2, chord / length[:, None]
@@ -114,7 +114,7 @@ def _with_middles(
 
 
 def _halved(problem: ContinuationProblem, row: Points) -> Points:
-    """Return the orbits with further ones in steps over which their stability changes unseen, or may change twice."""
+    """Halve steps over which the stability changes without a detected bifurcation, or may change twice."""
     for _ in range(HALVINGS):
         gaps = sorted({*_gaps(problem, row, _likely(problem, row)), *_dips(problem, row)})
         length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
@@ -129,13 +129,12 @@ def _halved(problem: ContinuationProblem, row: Points) -> Points:
 
 
 def _in_order(row: Points, places: Sequence[Place]) -> list[Place]:
-    """Return bifurcations in their order along a branch."""
     along = lambda p: float(np.dot(p.point.u - row.u[p.after], row.u[p.after + 1] - row.u[p.after]))
     return sorted(places, key=lambda p: (p.after, along(p)))
 
 
 def _parted(problem: ContinuationProblem, row: Points, places: Sequence[Place]) -> tuple[Points, list[Place]]:
-    """Return the orbits with one more between bifurcations of the same step, and the bifurcations in order."""
+    """Insert an orbit between bifurcations of the same step; also return the bifurcations in order."""
     places = _in_order(row, places)
     far = lambda a, b: bool(np.linalg.norm(b.point.u - a.point.u) > APART)
     pairs = np.flatnonzero([a.after == b.after and far(a, b) for a, b in itertools.pairwise(places)])
@@ -152,7 +151,7 @@ def _parted(problem: ContinuationProblem, row: Points, places: Sequence[Place]) 
 
 
 def _signals(problem: ContinuationProblem, points: Points) -> dict[str, np.ndarray]:
-    """Return functions along a branch that change sign at its special points."""
+    """Return functions along a branch that change sign at its bifurcations, by kind."""
     tests = test_functions(problem.multipliers(points))
     tests["branch-point"] = tests["fold"] * np.sign(points.tangent[..., -1])
     tests["fold"] = points.tangent[..., -1]
@@ -160,13 +159,13 @@ def _signals(problem: ContinuationProblem, points: Points) -> dict[str, np.ndarr
 
 
 def sign_changes(problem: ContinuationProblem, row: Points) -> list[tuple[int, str]]:
-    """Return for each change of sign of a test function the orbit before it, and its kind."""
+    """Return the preceding orbit and the kind for each change of sign of a test function."""
     values = _signals(problem, row)
     return sorted((int(k), kind) for kind, f in values.items() for k in np.flatnonzero(f[:-1] * f[1:] < 0))
 
 
 def _gaps(problem: ContinuationProblem, row: Points, seen: Sequence[tuple[int, str]]) -> list[tuple[int, int]]:
-    """Return pairs of orbits between which what was seen does not explain the change of the unstable multipliers."""
+    """Return pairs of orbits between which `seen` does not explain the change in the number of unstable multipliers."""
     count = problem.unstable(row)
     clear = np.flatnonzero(problem.unstable(row, 1 + CLEAR) == problem.unstable(row, 1 - CLEAR))
     found = []
@@ -179,14 +178,14 @@ def _gaps(problem: ContinuationProblem, row: Points, seen: Sequence[tuple[int, s
 
 
 def _likely(problem: ContinuationProblem, row: Points) -> list[tuple[int, str]]:
-    """Return the changes of sign without products of two multipliers that pass 1 while no complex pair leaves."""
+    """Return the changes of sign, except where a product of two multipliers passes 1 but no complex pair leaves."""
     mu = problem.multipliers(row)
     pairs = np.sum((np.abs(mu) >= 1) & (np.abs(np.imag(mu)) > COMPLEX), axis=-1)
     return [(k, kind) for k, kind in sign_changes(problem, row) if kind != "Neimark-Sacker" or pairs[k] != pairs[k + 1]]
 
 
 def _dips(problem: ContinuationProblem, row: Points) -> list[tuple[int, int]]:
-    """Return steps over which a test function may vanish twice, where the effects on the count may cancel."""
+    """Return steps over which a test function may vanish twice, which the number of unstable multipliers may hide."""
     tests = test_functions(problem.multipliers(row))
     length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
     found = _sinking(np.stack([*tests.values(), row.tangent[:, -1]]), length)
@@ -194,8 +193,7 @@ def _dips(problem: ContinuationProblem, row: Points) -> list[tuple[int, int]]:
 
 
 def _sinking(f: Float[np.ndarray, "functions points"], length: Float[np.ndarray, " steps"]) -> list[tuple[int, int]]:
-    """Return steps over which a function has one sign at both ends and, by a parabola through three points, the other
-    in between, or nearly."""
+    """Return steps in which a parabola through three points suggests that a function may change its sign twice."""
     back, ahead = length[:-1], length[1:]
     chord = np.diff(f) / length
     bend = np.diff(chord) / (back + ahead)
@@ -218,25 +216,22 @@ def _sinking(f: Float[np.ndarray, "functions points"], length: Float[np.ndarray,
 
 
 def _located(problem: ContinuationProblem, rows: Sequence[Points]) -> list[list[Place]]:
-    """Return the bifurcations on each branch that were seen and found."""
+    """Return the bifurcations on each branch that were detected and located."""
     places = [[Place(row, k, kind) for k, kind in sign_changes(problem, row)] for row in rows]
     _locate(problem, [p for mine in places for p in mine])
 
     def is_there(p: Place) -> bool:
         if p.point is None:
             return False
-        near = 1e-4 if p.kind == "Neimark-Sacker" else 1e-3  # a double multiplier is known to the root of rounding
+        near = 1e-4 if p.kind == "Neimark-Sacker" else 1e-3  # a double multiplier is accurate to sqrt(rounding)
         return bool(to_critical(critical_of(p.kind), jnp.asarray(problem.multipliers(p.point))) < near)
 
     return [[p for p in mine if is_there(p)] for mine in places]
 
 
 def _locate(problem: ContinuationProblem, places: Sequence[Place]) -> None:
-    """Set point, steps and error of each place: doubled steps move it until that is less than allowed.
-
-    A branch point, where the curve's equations are singular, may be found by some steps and not by others: its error is
-    from those that find it.
-    """
+    """Set point, steps and error of each place, doubling the steps until it moves by less than the tolerance; the error
+    of a branch point, where the curve's equations are singular, is computed from the steps that find it."""
     counts, chooses = problem.counts, problem.counts.chooses
     most = MOST_OF_A_POINT if chooses else int(counts.last)
     for p in places:
@@ -270,7 +265,7 @@ def _locate(problem: ContinuationProblem, places: Sequence[Place]) -> None:
 
 
 def _found_at(problem: ContinuationProblem, places: Sequence[Place]) -> list[Points | None]:
-    """Return where places are by their present steps, looked for close to where they were and then further out."""
+    """Locate places with their present steps, in brackets about their last location and then wider ones."""
     found: dict[int, Points | None] = dict.fromkeys(range(len(places)))
     for beyond in (None, *WIDER):
         ends = {i: e for i, p in enumerate(places) if found[i] is None and (e := p.ends(beyond)) is not None}
@@ -281,7 +276,7 @@ def _found_at(problem: ContinuationProblem, places: Sequence[Place]) -> list[Poi
 
 
 def _zeros(problem: ContinuationProblem, wanted: Sequence[tuple[Place, float, Points]]) -> list[Points | None]:
-    """Return where the test functions vanish between two orbits each, these solved for again by the place's steps.
+    """Return zeros of test functions, each between two orbits, which are solved for again with the place's steps.
 
     **Arguments:** place, accuracy, and orbits on both sides.
 
@@ -308,7 +303,7 @@ def _zeros(problem: ContinuationProblem, wanted: Sequence[tuple[Place, float, Po
 
 
 class _RegulaFalsi:
-    """The search for the zero of one test function between two points of a branch."""
+    """Regula falsi (Illinois variant) for one test function between two points of a branch."""
 
     def __init__(self, problem: ContinuationProblem, kind: str, within: float, ends: Points):
         self.signal = lambda points: _signals(problem, points)[kind]
@@ -322,7 +317,7 @@ class _RegulaFalsi:
         self.normal = self.chord / self.length if self.active else self.chord
 
     def aim(self) -> np.ndarray:
-        """Return where to evaluate the function next: on the cubic through the sides, where it passes the plane."""
+        """Return the next point of evaluation: the cubic through the two sides, where it passes the plane."""
         (low, high), (f0, f1) = self.shares, self.values
         margin = 1e-3 * (high - low)
         self.aimed = min(max((low * f1 - high * f0) / (f1 - f0), low + margin), high - margin)
@@ -338,9 +333,9 @@ class _RegulaFalsi:
         return found + np.dot(at - found, normal) * normal
 
     def update(self, got: Points) -> None:
-        """Move one end of the bracket to a new point."""
+        """Replace one end of the bracket by a new point."""
         low, high = self.shares
-        if not got.converged:  # near a branch point, where it is tried on both sides, and interpolated at last
+        if not got.converged:  # near a branch point: try on both sides, and interpolate at last
             near = (high - low) * self.length < 4 * BRACKETED
             self.best = _mixed(self.sides, (self.aimed - low) / (high - low)) if near else None
             self.active = not near and self.aside == 0.0
@@ -351,7 +346,7 @@ class _RegulaFalsi:
         end = int(f * self.values[1] >= 0)
         if self.aside != 0.0:
             self.aside = -self.aside if self.aside > 0 else 0.0
-        if f * self.last > 0:  # the same end was kept twice
+        if f * self.last > 0:  # one end was kept twice
             self.values[1 - end] /= 2
         self.sides[end], self.shares[end], self.values[end], self.last = got, self.share, f, f
         moved = np.inf if before is None else np.linalg.norm(got.u - before.u)
@@ -360,6 +355,6 @@ class _RegulaFalsi:
 
 
 def _mixed(sides: list[Points], share: float) -> Points:
-    """Return the linear interpolation of two near points."""
+    """Interpolate linearly between two points."""
     mix = lambda x, y: (1 - share) * x + share * y if np.issubdtype(np.asarray(x).dtype, np.floating) else x
     return jax.tree.map(mix, *sides)

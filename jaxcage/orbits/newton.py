@@ -1,13 +1,13 @@
-"""Newton's method for the equations of an orbit, damped, and repeated with twice the steps until the root stays.
+"""Damped Newton's method for the equations of an orbit, repeated with twice the steps until the root no longer moves.
 
-Orbits of stiff systems with contact have small basins, which a full Newton step often leaves. A step is halved until
-Deuflhard's natural monotonicity test holds, |J^-1 f(new)| < |J^-1 f(old)| with the old Jacobian, which does not depend
-on how the equations are scaled (P. Deuflhard, Newton Methods for Nonlinear Problems, 2004, sec. 3.3).
+In stiff systems with contact a full Newton step often leaves the small region of convergence. A step is halved until
+Deuflhard's natural monotonicity test holds, |J^-1 f(new)| < |J^-1 f(old)| with the old Jacobian, which is independent
+of the scaling of the equations (P. Deuflhard, Newton Methods for Nonlinear Problems, 2004, sec. 3.3).
 
-Roots have derivatives of any order by the implicit function theorem (`jax.lax.custom_root`), and not through the
-iterations. The equations see the system only through the few numbers of its field, so that the number of design
-parameters behind these does not matter. The return map is expanded in state and numbers (`by_columns`): reverse mode
-transposes its Jacobian matrix and does not run revolutions backwards.
+Roots have derivatives of any order by the implicit function theorem (`jax.lax.custom_root`), not through the
+iterations. The equations depend on the system only through the few numbers of its field, so that the number of design
+parameters does not matter. The return map is expanded in state and numbers (`by_columns`): reverse mode transposes its
+Jacobian matrix and does not integrate backwards.
 """
 
 import abc
@@ -36,22 +36,22 @@ class AbstractEquations(eqx.Module):
     def closing(
         self, u: Float[Array, " n"], image: Float[Array, " dim"], monodromy: Float[Array, "dim dim"]
     ) -> tuple[Float[Array, " n"], Any]:
-        """Return the equations and what else is wanted at the root, from the return map and its derivative."""
+        """Return the residual, and auxiliary results at the root, from the return map and its derivative."""
 
     @abc.abstractmethod
     def monodromy(self, found: Any) -> Any:
-        """Return the monodromy matrix from what continuation knows at a point, `Points`."""
+        """Return the monodromy matrix of `found`, which are `Points`."""
 
     @abc.abstractmethod
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
-        """Return the distance of two roots, in a unit of its own, and its ratio to what is allowed.
+        """Return the distance of two roots, in a unit of its own, and its ratio to the tolerance.
 
         **Arguments:** the difference of the two, shape (..., n), and the equations' derivatives at the first and at the
-        second, which has twice the steps; of JAX or of NumPy.
+        second, which has twice the steps; arrays of JAX or NumPy.
         """
 
     def linearised(self, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
-        """Return the equations, their derivative along each unknown, and what else is wanted at the root."""
+        """Return the residual, its derivative along each unknown, and auxiliary results at the root."""
 
         def at(u: Array) -> tuple[Array, tuple[Array, Any]]:
             problem = self.problem
@@ -63,8 +63,7 @@ class AbstractEquations(eqx.Module):
 
 
 class Newton(NamedTuple):
-    """The last point that Newton's method accepted, what is known there, and the share of the full step from there that
-    is being tried."""
+    """Last point accepted by Newton's method, and `factor`, the fraction of the full step from there that is tried."""
 
     point: Float[Array, " n"]
     jacobian: Float[Array, "n n"]
@@ -75,11 +74,8 @@ class Newton(NamedTuple):
 
 
 class Found(eqx.Module):
-    """The result of Newton's method beside the root, without derivatives.
-
-    `error` is the distance to the root by half the steps per revolution (see `AbstractEquations.apart`), infinite if
-    none was found, and NaN if these were not tried.
-    """
+    """Result of Newton's method apart from the root, without derivatives; `error` is the distance to the root with half
+    the steps (see `AbstractEquations.apart`), infinite if none was found, NaN if it was not computed."""
 
     converged: Bool[Array, ""]
     newton: Newton
@@ -91,7 +87,7 @@ class Found(eqx.Module):
 TOLERANCE = 1e-9
 """Largest last step of Newton's method, in the unknowns' units; the error is of the order of its square."""
 SMALLEST_FACTOR, SMALLEST_OF_A_NEAR_GUESS = 2.0**-10, 0.75
-"""Newton's method ends before it tries a smaller share of its step."""
+"""Smallest fraction of a full step that Newton's method tries, also from a guess that is near a root."""
 
 
 def solve(
@@ -105,11 +101,11 @@ def solve(
 ) -> tuple[Float[Array, " n"], Found]:
     """Find a root by damped Newton's method.
 
-    It ends if the full step is below `tolerance` (1 + |u|) in every component; that step is still taken, so that the
+    It ends if the full step is below `tolerance` (1 + |u|) in every component. That step is still taken, so that the
     error of the root is of the order of its square.
 
-    **Arguments:** equations with their derivative; first guess; most iterations; tolerance; `at_root` asks for one more
-    evaluation, at the root; lanes with `skip` do nothing; a guess that is `near` is given up if a full step leads away.
+    **Arguments:** equations with their derivative; initial guess; maximum number of iterations; tolerance; `at_root`,
+    to evaluate once more at the root; `skip`, to do nothing; `near`, to give up if a full step increases the distance.
 
     **Returns:** the root and `Found`, whose `newton` describes the point before the root or, if `at_root`, the root.
     """
@@ -149,14 +145,14 @@ def solve(
 def refined(
     equations: AbstractEquations, given: Any, guess: Float[Array, " n"], counts: Counts
 ) -> tuple[Float[Array, " n"], Found]:
-    """Find a root with as many steps as it needs: solve again with twice as many until it stays where it is."""
+    """Find a root, doubling the steps per revolution until it no longer moves."""
     once = lambda steps, u, skip: solve(
         partial(by_steps(equations, steps).linearised, given=given), u, at_root=True, skip=skip
     )
 
     def doubling(carry: tuple) -> tuple:
         i, u, before, done = carry
-        steps = counts.steps(i)  # the same in all lanes: numbers of their own would make them pass every step
+        steps = counts.steps(i)  # common to all lanes under `vmap`: otherwise each would run the largest number
         v, found = once(steps, jnp.where(before.converged, u, guess), done)
         both = before.converged & found.converged
         error, ratio = equations.apart(v - u, before.newton.jacobian, found.newton.jacobian)
@@ -179,7 +175,7 @@ def refined(
 
 @compiled
 def as_root(given: Any, *, equations: AbstractEquations, u: Float[Array, " n"]) -> tuple[Array, Any]:
-    """Return u and what else is known at it, as functions of what is given: u is a root of the equations there."""
+    """Return the root u of the equations and the auxiliary results there as differentiable functions of `given`."""
     problem, start = equations.problem, frozen(u)
 
     def closing(u: Array) -> tuple[Array, Any]:
@@ -193,17 +189,15 @@ def as_root(given: Any, *, equations: AbstractEquations, u: Float[Array, " n"]) 
 
 
 def numbers_of(strobe: StrobeMap) -> tuple[Float[Array, " k"], Callable[[Array], StrobeMap]]:
-    """Return the numbers of a map's field in a row, and the function that puts a row back into the map.
-
-    The system and its scale are left out: they only say how far out a state is and how large an error.
-    """
+    """Return the numbers of a map's field in a row, and the function that puts such a row into the map; the system and
+    its scale, which only serve to measure excursions and errors, are left out."""
     numbers, rest = eqx.partition(strobe.field, eqx.is_inexact_array)
     k, unravel = ravel_pytree(numbers)
     return k, lambda row: dataclasses.replace(strobe, field=eqx.combine(unravel(row), rest))
 
 
 class Push(eqx.Module):
-    """Image of a state and its derivatives, as a function of state and numbers of the field in a row."""
+    """Image of a state and its derivatives, as a function of the state and the field's numbers in a row."""
 
     strobe: StrobeMap
     problem: OrbitProblem
@@ -214,7 +208,7 @@ class Push(eqx.Module):
 
 
 class Slopes(eqx.Module):
-    """A function's value and Jacobian matrix."""
+    """Value and Jacobian matrix of `f`."""
 
     f: Callable[[Array], Any]
 
@@ -224,10 +218,8 @@ class Slopes(eqx.Module):
 
 
 def by_columns(x: Float[Array, " n"], f: Callable[[Array], Any]) -> Any:
-    """Return f(x), which reverse mode, too, differentiates by f's Jacobian matrix in forward mode, to any order.
-
-    `f` is a module; its own numbers have no derivative.
-    """
+    """Return f(x); even in reverse mode its derivatives, of any order, come from Jacobians in forward mode. `f` is a
+    module, whose own numbers have no derivative."""
     numbers, rest = eqx.partition(f, eqx.is_array)
 
     @jax.custom_jvp

@@ -38,15 +38,15 @@ if TYPE_CHECKING:
 
 ROUNDING = 1e-13
 SPUN = 200  # revolutions of the simulation that leads to an orbit
-AT_REST = 1e-3  # a simulation has led to one if it moves by less, in units of the system's scale
+AT_REST = 1e-3  # largest motion between two runs, in units of the system's scale, of a simulation that has settled
 LIOUVILLE_TOLERANCE = 1e-3  # largest disagreement in log|det M| at which multipliers are trusted
 ADAPTIVE_PARTS, MOST_PARTS = 256, 4096
-"""Parts of a revolution for integrating the divergence: with a method that has no steps, and with steps that are a
-multiple of the second."""
+"""Parts of a revolution for the integral of the divergence: with adaptive methods, and with steps that are a multiple
+of the second."""
 
 
 class OrbitEquations(AbstractEquations):
-    """P(z) = z: as many equations as unknowns or, if a parameter of the problem is free, the equations of a branch."""
+    """P(z) = z for an orbit or, if a parameter of the problem is free, for a branch of orbits."""
 
     problem: OrbitProblem
 
@@ -54,7 +54,7 @@ class OrbitEquations(AbstractEquations):
         return image - u[: self.problem.dimension], monodromy
 
     def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Any]:
-        """Run one revolution with the state's tangents and a column for each other unknown, in one kernel."""
+        """Apply the map with the state's tangents and one column for each other unknown, in one kernel."""
         problem, n = self.problem, self.problem.dimension
         drifts = [problem.drift(u, given, i) for i in range(n, u.size)]
         image, columns = problem.returned(problem.prepare(u, given), u[:n], drifts)
@@ -65,7 +65,7 @@ class OrbitEquations(AbstractEquations):
         return found.jacobian[..., :n, :n] + np.eye(n)
 
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
-        """Compare by the change of the map, with the margin that simulations have, and of its relative derivative."""
+        """Compare the map, with the safety factor of simulations, and its relative derivative."""
         n = self.problem.dimension
         image = abs(fine @ moved[..., None])[..., 0].max(-1)
         size = lambda m: abs(m[..., :n]).max((-2, -1))
@@ -73,17 +73,17 @@ class OrbitEquations(AbstractEquations):
 
 
 class Orbit(eqx.Module):
-    """A periodic orbit. If none was found its numbers are NaN and `status` says so.
+    """A periodic orbit with its Floquet multipliers; if none was found, its numbers are NaN (see `status`).
 
     - `state`: state at phase 0 [SI]; `speed` [rad/s].
-    - `multipliers`: Floquet multipliers over all its `periods`, the largest first; `monodromy` is the derivative of the
-        map, in units of the system's scale, in which `residual` is the largest component of P(z) - z.
-    - `liouville`: log|det M| minus the integral of the field's divergence over the orbit, which must be equal. Both are
-        limited to what rounding resolves of the smallest multiplier, so that the others check a strongly damped orbit.
+    - `multipliers`: Floquet multipliers over `periods` revolutions, the largest first; `monodromy` is the derivative of
+        the map P, and `residual` the largest component of P(z) - z, both in units of the system's scale.
+    - `liouville`: difference of log|det M| and the integral of the field's divergence, which should be zero. Both are
+        bounded below at the resolution of the smallest multiplier, so that strongly damped orbits can be checked, too.
     - `steps`: steps per revolution of `solver`; 1 if the method has no such number and is `solver` itself.
-    - `error`: three times the largest component of the change of P at the orbit against half as many steps, in units of
-        the scale: at a grazing contact one difference of steps may be too small by chance. It is infinite if these
-        steps find no orbit, NaN if the method has no number of steps.
+    - `error`: three times the largest change of P at the orbit when the steps are halved, in units of the scale (the
+        factor is for grazing contacts, where one difference may be small by chance). It is infinite if half the steps
+        find no orbit, NaN if the method has no number of steps.
     """
 
     state: Float[Array, " dim"]
@@ -100,17 +100,17 @@ class Orbit(eqx.Module):
 
     @property
     def method(self) -> AbstractMethod:
-        """Integration method, with its steps."""
+        """Integration method, with its number of steps."""
         return self.solver if isinstance(self.solver, AbstractMethod) else FixedSteps(self.solver, self.steps)
 
     @property
     def stable(self) -> Bool[Array, ""]:
-        """Whether every multiplier is inside the unit circle."""
+        """True if every multiplier is inside the unit circle."""
         return self.converged & (jnp.max(jnp.abs(self.multipliers)) < 1.0)
 
     @property
     def status(self) -> str:
-        """`converged`, `no orbit` or `multipliers not trusted` (Liouville's identity is violated)."""
+        """Status in words: `converged`, `no orbit` or `multipliers not trusted` (Liouville's identity is violated)."""
         if not bool(self.converged):
             return "no orbit"
         return "converged" if abs(float(self.liouville)) <= LIOUVILLE_TOLERANCE else "multipliers not trusted"
@@ -136,13 +136,13 @@ if TYPE_CHECKING:
     Guess: TypeAlias = StateLike | Orbit
     NearOrbit: TypeAlias = Orbit | Point | tuple[StateLike, Scalar]
     PointGuess: TypeAlias = Scalar | NearOrbit
-else:  # the functions check these arguments themselves
+else:  # checked by the functions themselves
     Guess = NearOrbit = PointGuess = object
 
 
 @jax.custom_jvp
 def sorted_multipliers(monodromy: Float[Array, "dim dim"]) -> Complex[Array, " dim"]:
-    """Return the eigenvalues, the largest first; they are differentiable to any order where they are distinct."""
+    """Return the eigenvalues, the largest first, differentiable to any order where they are distinct."""
     mu = jnp.linalg.eigvals(monodromy)
     return mu[jnp.argsort(-jnp.abs(mu))]
 
@@ -161,9 +161,9 @@ def divergence_integral(
 ) -> Float[Array, ""]:
     """Integrate the field's divergence over `periods` revolutions along the orbit through `state` [SI].
 
-    By Liouville's identity the result is log|det M|, which checks every monodromy matrix: errors of integration and of
-    differentiation and, in stiff systems, multipliers lost to rounding show as a disagreement. The trapezoidal rule, at
-    the integration steps or at enough of them, converges on a closed orbit faster than any power of the step.
+    By Liouville's identity the result is log|det M|. A difference reveals errors of integration or differentiation and,
+    in stiff systems, multipliers lost to rounding. On a closed orbit the trapezoidal rule, applied at the integration
+    steps or a part of them, converges faster than any power of the step.
     """
     parts = ADAPTIVE_PARTS
     if isinstance(strobe.method, FixedSteps):
@@ -185,7 +185,7 @@ def divergence_integral(
 def _simulated(
     problem: OrbitProblem, given: Given, start: Array, revolutions: Array, counts: Counts
 ) -> Float[Array, " dim"]:
-    """Return the state after `revolutions` from `start`, and as many with twice the steps until it is at rest."""
+    """Return the state after `revolutions` from `start`, repeated with twice the steps until it settles."""
 
     def turn(i: Array, carry: tuple) -> tuple:
         y, done = carry
@@ -202,7 +202,7 @@ def _simulated(
 def _find(
     problem: OrbitProblem, counts: Counts, spinning: Counts, given: Given, guess: Array, revolutions: Any
 ) -> tuple[Orbit, OrbitEquations, Array]:
-    """Find the orbit, without derivatives; return its equations and unknowns, too."""
+    """Find the orbit, without derivatives; also return its equations and unknowns."""
     if revolutions is not None:
         guess = _simulated(problem, given, guess, revolutions, spinning)
     equations = OrbitEquations(problem)
@@ -214,7 +214,7 @@ def _find(
     state, multipliers = _place(equations, u, monodromy)
     expected = divergence_integral(equations.problem.prepare(u, given), state, problem.periods)
     size = jnp.linalg.svd(jnp.where(jnp.isfinite(monodromy), monodromy, 0.0), compute_uv=False)
-    # log|det| of a matrix like this one whose smallest singular value is at the level of rounding
+    # log|det| if the smallest singular value were at the level of rounding
     floor = jnp.sum(jnp.log(size[:-1])) + jnp.log(size[0]) + jnp.log(ROUNDING)
     orbit = Orbit(
         state=state,
@@ -234,7 +234,6 @@ def _find(
 
 @compiled
 def _place(equations: OrbitEquations, u: Array, monodromy: Array) -> tuple[Array, Array]:
-    """Return state and multipliers of an orbit."""
     finite = jnp.isfinite(monodromy)
     multipliers = jnp.where(jnp.all(finite), sorted_multipliers(jnp.where(finite, monodromy, 0.0)), jnp.nan)
     return equations.problem.state(u), multipliers
@@ -257,11 +256,12 @@ def periodic_orbit(
     - `periods`: revolutions after which the orbit closes.
     - `guess`: a state [SI] near the orbit, or an `Orbit`; by default the first of the system's own initial states.
     - `revolutions`: revolutions of simulation before Newton's method; by default 200 without a guess, none with one.
-    - `method`: integration method; by default as many steps as the orbit needs, by Runge-Kutta or, if that finds no
-        orbit that stays where it is with more steps, by Rodas4 (never under `jit` and `vmap`).
+    - `method`: integration method; by default Runge-Kutta with as many steps as the orbit needs or, if that does not
+        converge, Rodas4 (never under `jit` and `vmap`).
 
-    **Returns:** `Orbit`, with its steps and their error; it does not raise if there is none. The function works under
-    `jit` and `vmap`. State and multipliers have derivatives of every order with respect to `system` and `speed`.
+    **Returns:** `Orbit`, with the steps used and their error; if none is found there is no exception. The function
+    works under `jit` and `vmap`. State and multipliers have derivatives of every order with respect to `system` and
+    `speed`.
     """
     require_x64()
     require_at_least(1, periods=periods)
@@ -270,7 +270,7 @@ def periodic_orbit(
         require_at_least(0, revolutions=revolutions)
     given = Given(system, jnp.asarray(speed, dtype=float))
     start = guess_state(system, given.speed, guess)
-    once = revolutions is not None  # no more revolutions than asked for
+    once = revolutions is not None  # no more revolutions than requested
     if revolutions is None and guess is None:
         revolutions = SPUN
     spin = None if revolutions is None else jnp.asarray(revolutions)
@@ -292,12 +292,12 @@ def periodic_orbit(
 
 
 def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Guess | None) -> Float[Array, " dim"]:
-    """Return a guess as an array, without derivative."""
+    """Return a guess, by default the first initial state, as an array without derivative."""
     given: Any = system.initial_states(speed)[0] if guess is None else guess
     wanted = f"must be a state of {system.dimension} numbers"
     try:
         state = given.state if isinstance(given, Orbit) else jnp.stack([jnp.asarray(c, dtype=float) for c in given])
-    except (TypeError, ValueError) as error:  # of another kind, or ragged
+    except (TypeError, ValueError) as error:  # not numbers, or of unequal shapes
         raise ArgumentError("guess", said=f"{wanted}, but {shown(guess)} was given.") from error
     if state.shape != (system.dimension,):
         raise ArgumentError("guess", said=f"{wanted}, but has shape {state.shape}.")

@@ -1,11 +1,11 @@
-"""Bifurcation points of periodic orbits: their kinds, the matrices and functions that vanish there, and what is known.
+"""Bifurcation points of periodic orbits: their kinds, and the matrices and functions that vanish there.
 
 With monodromy matrix M an orbit is at a
 - fold, where a multiplier is 1: M - I is singular;
 - period doubling, where a multiplier is -1: M + I is singular;
 - Neimark-Sacker bifurcation, where a complex pair is on the unit circle: the second compound matrix of M, whose
-  eigenvalues are the products mu_i mu_j (i < j), has the eigenvalue 1. It also has at a neutral saddle, a real pair
-  mu and 1/mu, which is no bifurcation; and it is regular where the pair meets at 1 or -1, unlike M - exp(i phi) I.
+  eigenvalues are the products mu_i mu_j (i < j), has the eigenvalue 1. So it has at a neutral saddle, a real pair mu
+  and 1/mu, which is not a bifurcation; unlike M - exp(i phi) I it is regular where the pair meets at 1 or -1.
 The determinants are symmetric functions of all multipliers: nothing jumps when multipliers cross each other.
 """
 
@@ -28,21 +28,21 @@ from .problem import SPEED, Parameter, frozen, is_traced, value_of
 
 
 Kind = Literal["period-doubling", "Neimark-Sacker", "fold"]
-"""Kinds that Newton's method solves for; a branch has branch points, too."""
+"""Kinds of bifurcation that Newton's method solves for; a branch may also have branch points."""
 CRITICAL = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}
-"""The critical multiplier of each kind that has a real one."""
+"""Critical multiplier of each kind that has a real one."""
 COMPLEX = 1e-5
-"""Least imaginary part of a complex multiplier: a double real one has the root of rounding."""
+"""Smallest imaginary part of a complex multiplier; that of a double real one may reach the square root of rounding."""
 
 
 def _second_compound(m: Float[Array, "n n"]) -> Float[Array, "k k"]:
-    """Return all 2 x 2 minors of `m`, k = n (n - 1)/2: the eigenvalues are products of pairs of those of `m`."""
+    """Return all 2 x 2 minors of `m`, k = n (n - 1)/2; the eigenvalues are products of pairs of those of `m`."""
     i, j = np.triu_indices(m.shape[0], 1)
     return m[np.ix_(i, i)] * m[np.ix_(j, j)] - m[np.ix_(i, j)] * m[np.ix_(j, i)]
 
 
 def critical_of(kind: str) -> Float[Array, ""] | None:
-    """Return the critical multiplier of a kind; None where it is a complex pair."""
+    """Return the critical multiplier of a kind, None for a complex pair."""
     return jnp.asarray(CRITICAL[kind]) if kind in CRITICAL else None
 
 
@@ -63,7 +63,7 @@ def null_vectors(a: Float[Array, "k k"]) -> tuple[Float[Array, " k"], Float[Arra
 def bordered(
     a: Float[Array, "k k"], left: Float[Array, " k"], right: Float[Array, " k"]
 ) -> tuple[Float[Array, ""], Float[Array, " k"], Float[Array, " k"]]:
-    """Return a scalar that vanishes where `a` is singular, smooth and well scaled unlike the determinant.
+    """Return a scalar that vanishes where `a` is singular; unlike the determinant it is well scaled.
 
     **Arguments:** matrix; vectors not orthogonal to its left and right null vectors.
 
@@ -79,7 +79,7 @@ def bordered(
 
 
 def test_functions(multipliers: Complex[np.ndarray, "*points n"]) -> dict[str, Float[np.ndarray, "*points"]]:
-    """Return real functions of all multipliers that change sign at a bifurcation of each kind."""
+    """Return real functions of the multipliers that change sign at a bifurcation, by its kind."""
     mu = np.asarray(multipliers)
     i, j = np.triu_indices(mu.shape[-1], 1)
     product = lambda factors: np.asarray(np.prod(factors, axis=-1).real)
@@ -91,10 +91,8 @@ def test_functions(multipliers: Complex[np.ndarray, "*points n"]) -> dict[str, F
 
 
 def to_critical(critical: Float[Array, ""] | None, multipliers: Complex[Array, " n"]) -> Float[Array, ""]:
-    """Return the distance of the nearest multiplier from the critical one or, without one, of a pair from the circle.
-
-    Only complex multipliers count as a pair: a real one whose product is 1 is a neutral saddle.
-    """
+    """Return the distance of the nearest multiplier from the critical one or, if None, of a complex pair from the unit
+    circle; a real pair whose product is 1 is a neutral saddle and does not count."""
     if critical is None:
         return jnp.min(jnp.where(jnp.abs(multipliers.imag) > COMPLEX, jnp.abs(jnp.abs(multipliers) - 1), jnp.inf))
     return jnp.min(jnp.abs(multipliers - critical))
@@ -116,32 +114,31 @@ class Outcome(enum.IntEnum):
 
     FOUND = 0
     NO_SUCH_POINT = 1  # Newton's method found none
-    OTHER_KIND = 2  # the multipliers are not those of the kind asked for, as at a neutral saddle
-    TANGENTIAL = 3  # the multiplier hardly crosses, so that the place is not a function of the design
-    NOT_CONVERGED = 4  # half the steps put it elsewhere
-    UNEXPLAINED = 5  # the number of unstable multipliers changes and no bifurcation is found
-    GIVEN = 6  # it is not solved for yet
+    OTHER_KIND = 2  # the multipliers are not those of the kind requested, as at a neutral saddle
+    TANGENTIAL = 3  # the multiplier hardly crosses, so that the value is not a smooth function of the design
+    NOT_CONVERGED = 4  # the value changes too much when the steps are halved
+    UNEXPLAINED = 5  # the number of unstable multipliers changes but no bifurcation is found
+    GIVEN = 6  # not solved for yet
 
 
 class Point(eqx.Module):
-    """A bifurcation of a periodic orbit. If none was found its numbers are NaN and `status` says so.
+    """A bifurcation of a periodic orbit; if none was found, its numbers are NaN (see `status`).
 
     - `kind`: `period-doubling`, `Neimark-Sacker`, `fold` or `branch-point`; on a branch also `unexplained`: the number
-        of unstable multipliers changes and no bifurcation is found, so that one was missed, or the branch is not one.
-        Kind, speed and state are enough to start Newton's method from.
+        of unstable multipliers changes but no bifurcation is found, so that one was missed, or the curve is not one
+        branch. Kind, speed and state are a sufficient guess for Newton's method.
     - `speed` [rad/s], `state` at phase 0 [SI] and `value` of the `parameter` [SI], which may be the speed, are
-        differentiable. `periods` are the revolutions after which the orbit closes; `steps` are those of a revolution.
-    - `error`: distance of the value to that by half the steps or, if that is more, twice the distance to that by three
-        quarters of them and one [SI]; infinite if these do not find it, NaN if the method has no number of steps; for
-        an unexplained change the distance within which it lies. Under `jit`, `vmap` and `grad` only half the steps are
-        tried.
+        differentiable. `periods`: revolutions after which the orbit closes; `steps`: steps per revolution.
+    - `error`: change of the value with half the steps or, if larger, twice the change with an odd number near three
+        quarters of them [SI]; infinite if these do not find it, NaN if the method has no number of steps; for an
+        unexplained change the distance within which it lies. Under `jit`, `vmap` and `grad` only half are tried.
     - `direction`: critical direction in the state [SI], of length 1 in units of the scale; zero for a Neimark-Sacker
         bifurcation. `residual`: largest component of the equations, in units of the scale.
     - `transversality`: d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is
         infinite, the drift p dP/d parameter of the map along the critical direction, with p q = 1. It is not computed
         on a branch.
-    - `index` and `edge`, on a branch: the orbit before the point, and whether a stable orbit is on one side of it.
-    - `looked`: where it was looked for, if neither Newton's method nor the branch led to it.
+    - `index`, `edge`, on a branch: the orbit before the point; True if a stable orbit is on one side of it.
+    - `looked`: description of the search, if neither Newton's method nor continuation found it.
     """
 
     kind: str = eqx.field(static=True)
@@ -167,27 +164,27 @@ class Point(eqx.Module):
 
     @property
     def speed_rpm(self) -> Scalar:
-        """Speed in revolutions per minute."""
+        """Speed [rpm]."""
         return self.speed * 30 / np.pi
 
     @property
     def error_rpm(self) -> Scalar:
-        """Error of a speed in revolutions per minute."""
+        """Error of a value that is a speed [rpm]."""
         return self.error * 30 / np.pi
 
     @property
     def converged(self) -> Bool[Array, ""] | bool:
-        """Whether a point of the kind asked for was found."""
+        """True if a point of this kind was found."""
         return (self.outcome == Outcome.FOUND.value) | (self.outcome == Outcome.TANGENTIAL.value)
 
     @property
     def trusted(self) -> Bool[Array, ""] | bool:
-        """Whether its place is a function of the design: it was found, and the multiplier crosses at a finite rate."""
+        """True if it was found and its multiplier crosses at a finite rate: a smooth function of the design."""
         return self.outcome == Outcome.FOUND.value
 
     @property
     def critical(self) -> complex:
-        """The multiplier on the unit circle, with a positive imaginary part."""
+        """Multiplier on the unit circle, of a complex pair the one with positive imaginary part."""
         target, mu = CRITICAL.get(self.kind), np.asarray(self.multipliers)
         if target is not None:
             return complex(mu[np.argmin(np.abs(mu - target))])
@@ -201,12 +198,12 @@ class Point(eqx.Module):
 
     @property
     def status(self) -> str:
-        """`converged`, or the name of another `Outcome` in words."""
+        """Status in words: `converged`, or the name of another `Outcome`."""
         outcome = Outcome(int(self.outcome))
         return "converged" if outcome == Outcome.FOUND else outcome.name.lower().replace("_", " ")
 
     def as_edge(self, kind: str) -> Edge:
-        """Return it as the edge of a zone, which is `chaotic` or `unstable`."""
+        """Return the point as the edge of a zone of `kind` `chaotic` or `unstable`."""
         return Edge(float(self.speed_rpm), float(self.error_rpm), kind, self.kind, "located")
 
     def __str__(self) -> str:
@@ -227,7 +224,7 @@ class Point(eqx.Module):
 
 
 def require_found(point: Point, name: str = "point") -> None:
-    """**Raises:** `ArgumentError` for a point that was looked for and not found, so that it has no value."""
+    """Raise `ArgumentError` for a point that was not found, so that it has no value."""
     if not np.isfinite(float(point.value)):
         raise ArgumentError(name, said=f"must be one that was found, but this {point.kind} was not.")
 
@@ -245,7 +242,7 @@ def read_start(
 ) -> Start:
     """Return state, speed and value of an orbit, a point, a pair (state, value), or a value, without derivatives.
 
-    A value alone comes with the first of the system's initial states.
+    For a value alone the state is the first of the system's initial states.
 
     **Raises:** `ArgumentError`, for the argument called `name`, if it is none of these or has no speed.
     """

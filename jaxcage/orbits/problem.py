@@ -1,15 +1,15 @@
 """The return map of a periodic orbit in the unknowns of Newton's method and of continuation; its steps per revolution.
 
-The unknowns are numbers of order one: the state z in units of the system's scale, then the free parameters in units of
-their own. The revolutions, which are expensive, see the system only through the numbers of its field at one speed (some
-twenty for a cage), and these follow cheaply from the design. `OrbitProblem.prepare` computes the numbers and
-`OrbitProblem.returned` runs the revolutions, so that a derivative with respect to any number of design parameters costs
-no more than one with respect to the field's numbers.
+The unknowns are of order one: the state z in units of the system's scale, then the free parameters in units of their
+own. The expensive integration depends on the system only through the numbers of its field at one speed (about twenty
+for a cage), which follow cheaply from the design. `OrbitProblem.prepare` computes these numbers and
+`OrbitProblem.returned` integrates, so that derivatives with respect to any number of design parameters cost no more
+than those with respect to the field's numbers.
 
-The steps of a revolution are doubled until half as many give the same orbit. The map of equal steps is as smooth as the
-field, so that roots and derivatives are exact for it; its distance from the true map is seen by solving again with
-twice the steps, from the orbit known. An orbit usually takes 256 to 2048 steps, whether it touches the land or not,
-because steps are shortened during a contact.
+The steps per revolution are doubled until half as many give the same orbit. The map of equal steps is as smooth as the
+field, so that roots and derivatives are exact for it; its error is estimated by solving again with twice the steps from
+the known orbit. An orbit usually takes 256 to 2048 steps, with or without contact, because steps are shortened during a
+contact.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,28 +31,26 @@ from ..solve import AbstractMethod, FixedSteps, StrobeMap, method as make_method
 SPEED = "speed"
 FIRST, FIRST_OF_RODAS4, MOST = 256, 512, 16384
 MOST_OF_A_POINT = 2 * MOST  # a bifurcation point by 16384 steps is confirmed by twice as many
-ENOUGH = 4096  # most steps of a computation that only leads to an orbit
+ENOUGH = 4096  # most steps of a computation that only provides a guess
 GIVEN_UP = 2048  # if this many steps find nothing, more are not tried
 IMAGE, SLOPE = 1e-6, 1e-3
 """Largest change of the map, in units of the system's scale, and of its derivative, relative to one plus its size,
 between an orbit's steps and half as many."""
-POINT = 1e-7  # largest change of the place of a bifurcation, relative
-SETTLED = 2e-4  # a point whose place changes by more, relative, is not known; nor is an orbit with a larger error
-BY_OTHERS = 2.0  # the stated error of a point is at least this many times its distance to that by `other_steps`
+POINT = 1e-7  # largest relative change of the value of a bifurcation
+SETTLED = 2e-4  # a point with a larger relative change, or an orbit with a larger error, counts as not found
+BY_OTHERS = 2.0  # the stated error of a point is at least this many times its change with `other_steps`
 
 
 def value_of(system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> Array:
-    """Return the present value of `parameter`."""
     return jnp.asarray(speed if parameter == SPEED else pick(system, parameter)(system), dtype=float)
 
 
 def name_of(parameter: Parameter) -> str:
-    """Return the name of a parameter, which is `parameter` for one that a function picks."""
     return parameter if isinstance(parameter, str) else "parameter"
 
 
 def _depends_on_input(f: Callable[[Array], list[Array]], x: Array) -> list[bool]:
-    """Return, for each array of f(x), whether it depends on x."""
+    """Return for each array of f(x) True if it depends on x."""
     traced = jax.make_jaxpr(f)(x).jaxpr
     touched = set(traced.invars)
     reached = lambda v: not isinstance(v, jex.core.Literal) and v in touched
@@ -63,23 +61,22 @@ def _depends_on_input(f: Callable[[Array], list[Array]], x: Array) -> list[bool]
 
 
 def frozen(tree: Any) -> Any:
-    """Return the tree without derivatives; only traced values can have them."""
+    """Return the tree without derivatives, which only traced values can have."""
     return jax.tree.map(lambda x: jax.lax.stop_gradient(x) if isinstance(x, Tracer) else x, tree)
 
 
 def is_traced(tree: Any) -> bool:
-    """Return whether anything in the tree is traced, and so may have derivatives."""
+    """Return True if anything in the tree is traced, and so may have derivatives."""
     return any(isinstance(x, Tracer) for x in jax.tree.leaves(tree))
 
 
 class Given(eqx.Module):
-    """The system and the speed: derivatives are taken with respect to these."""
+    """System and speed, with respect to which derivatives are taken."""
 
     system: AbstractForcedSystem
     speed: Scalar
 
     def changed(self, parameter: Parameter, new: Any) -> "Given":
-        """Return a copy with `parameter` set to `new`."""
         if parameter == SPEED:
             return Given(self.system, new)
         return Given(eqx.tree_at(pick(self.system, parameter), self.system, new), self.speed)
@@ -99,7 +96,6 @@ class OrbitProblem(eqx.Module):
 
     @property
     def dimension(self) -> int:
-        """Length of the state."""
         return self.scale.shape[-1]
 
     def values(self, u: Float[Array, " n"]) -> Float[Array, " parameters"]:
@@ -118,21 +114,21 @@ class OrbitProblem(eqx.Module):
         return given
 
     def prepare(self, u: Float[Array, " n"], given: Given) -> StrobeMap:
-        """Return the strobe map at the unknowns u, which is all that depends on speed and design."""
+        """Return the strobe map at the unknowns u, which contains all that depends on speed and design."""
         there = self.at(u, given)
         return strobe_map(there.system, there.speed, self.method)
 
     def drift(self, u: Float[Array, " n"], given: Given, i: int) -> list[Any]:
-        """Return how the field's numbers change with the i-th unknown; None for those that do not depend on it."""
+        """Return the derivatives of the field's numbers by the i-th unknown, None for those independent of it."""
         row = lambda x: jax.tree.leaves(eqx.filter(self.prepare(u.at[i].set(x), given).field, eqx.is_inexact_array))
         _, slope = jax.jvp(row, (u[i],), (jnp.ones_like(u[i]),))
         return [s if d else None for s, d in zip(slope, _depends_on_input(row, u[i]), strict=True)]
 
     def returned(self, strobe: StrobeMap, z: Float[Array, " dim"], drifts: Sequence[Any] = ()) -> tuple[Array, Array]:
-        """Apply the return map, which is the strobe map `periods` times.
+        """Apply the return map, the strobe map `periods` times.
 
-        **Returns:** the image of z, and the derivatives of the image in columns: with respect to z (the monodromy
-        matrix), then along each drift of the field's numbers.
+        **Returns:** the image of z, and its derivatives in columns: by z (the monodromy matrix), then along each drift
+        of the field's numbers.
         """
         scale, n = self.scale, z.size
         zero = jnp.zeros(())
@@ -163,33 +159,29 @@ def make_problem(
 
 
 def other_steps(steps: Any) -> Any:
-    """Return a number of steps that shares no ends of steps with `steps`.
-
-    Where a motion meets a kink of the law near an end that 256, 512, 1024, ... steps share, doubling them changes
-    nothing, and all of them are wrong.
-    """
+    """Return a number of steps whose ends are at other phases: doubling 256 steps again and again does not reveal the
+    error from a kink of the law near an end that all these numbers share."""
     return (3 * steps // 4) | 1
 
 
 class Counts(NamedTuple):
-    """The numbers of steps to try, each twice the one before."""
+    """Numbers of steps to try, each twice the one before."""
 
     first: Int[Array, ""]
     last: Int[Array, ""]
     tolerance: Float[Array, ""]
-    """Allowed difference of two results, in units of what is allowed; 0 if the last number was asked for."""
+    """Allowed ratio of the difference of two results to its tolerance; 0 if the last number is prescribed."""
 
     @property
     def tries(self) -> Int[Array, ""]:
-        """How many numbers there are."""
+        """Number of numbers to try."""
         return 1 + jnp.ceil(jnp.log2(self.last.astype(float) / self.first.astype(float)) - 1e-9).astype(int)
 
     def steps(self, i: Any) -> Int[Array, ""]:
-        """Return the i-th number."""
         return jnp.minimum(self.first * 2**i, self.last)
 
     def near(self, steps: Any) -> "Counts":
-        """Return the numbers to try where `steps` were right nearby: half as many come first, for the error."""
+        """Return the numbers to try if `steps` were sufficient nearby, from half as many on, for the error."""
         if steps is None or isinstance(steps, Tracer):
             return self
         first = jnp.clip(jnp.asarray(steps, int) // 2, self.first, self.last)
@@ -197,17 +189,15 @@ class Counts(NamedTuple):
 
     @property
     def chooses(self) -> bool:
-        """Whether the number of steps follows from the error."""
+        """True if the number of steps is chosen by the error."""
         return float(self.tolerance) > 0
 
 
 def counted(
     method: AbstractMethod | None, most: int = MOST, solver: str = "rk4", first: int = FIRST
 ) -> tuple[AbstractMethod, Counts]:
-    """Return a method with its number of steps left open, and the numbers to try.
-
-    These are the number of the method and half as many or, without a method, as many as are needed.
-    """
+    """Return a method with its number of steps left open, and the numbers to try: half the method's own number and that
+    number or, without a method, as many as are needed."""
     chosen, begin, last = make_method(solver) if method is None else method, first, most
     if not isinstance(chosen, FixedSteps):
         begin, last = 1, 1
@@ -226,9 +216,9 @@ T = TypeVar("T", bound=eqx.Module)
 
 
 def by_steps(tree: T, steps: Any) -> T:
-    """Return a method, a problem or equations with this number of steps per revolution, if it has such a number."""
+    """Return a method, a problem or equations with this number of steps per revolution, if the method has one."""
     changed = lambda x: FixedSteps(x.solver, jnp.asarray(steps, int)) if isinstance(x, FixedSteps) else x
-    return jax.tree.map(changed, tree, is_leaf=lambda x: isinstance(x, AbstractMethod))  # not parts of a method
+    return jax.tree.map(changed, tree, is_leaf=lambda x: isinstance(x, AbstractMethod))  # do not enter methods
 
 
 def with_fallback(
@@ -237,10 +227,8 @@ def with_fallback(
     serves: Callable[[Any], Any],
     most: int = MOST,
 ) -> Any:
-    """Return what `find` finds with a method or, without one, with Runge-Kutta and, if that fails, with Rodas4.
-
-    The solver is chosen before compilation: inside `jit` and `vmap` it is always Runge-Kutta.
-    """
+    """Return the result of `find` with a method or, without one, with Runge-Kutta and, if that fails, with Rodas4 (but
+    never under `jit` and `vmap`, since the solver is chosen before compilation)."""
     found = find(*counted(method, most))
     if method is not None or isinstance(good := serves(found), Tracer) or bool(good):
         return found

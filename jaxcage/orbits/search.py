@@ -1,8 +1,8 @@
-"""Search for synchronous (period-1) orbits over a range of speed, without a hint of where they are.
+"""Search for synchronous (period-1) orbits over a range of speed, without an initial guess.
 
-Newton's method leads to stable orbits from the ends of simulations on a coarse grid of speeds. Each orbit is followed
-both ways, until every orbit that was met lies on a known branch. Stable stretches of the branches are bounded by
-bifurcations; between them are the unstable ranges of the synchronous orbit.
+Newton's method starts from the final states of simulations on a coarse grid of speeds. The stable orbits found are
+followed in both directions until every one of them lies on a known branch. Stable stretches of the branches are bounded
+by bifurcations; between them are the unstable ranges of the synchronous orbit.
 """
 
 import dataclasses
@@ -27,15 +27,15 @@ from .point import Point
 from .problem import SPEED, Given
 
 
-ROUND, ROUNDS = 4, 8  # branches followed at a time, and how often
+ROUND, ROUNDS = 4, 8  # branches followed at a time, and maximum number of rounds
 PATIENCE = 150  # unstable orbits in a row after which a branch is not followed further
-TRIES = 3  # branches followed where one stable range is wanted
-PATIENCE_OUT = 3  # the same where only the stable orbits on both sides are wanted
+TRIES = 3  # maximum number of branches followed by `stable_range`
+PATIENCE_OUT = 3  # unstable orbits in a row after which `stable_range` does not follow a branch further
 OUTWARD = StepControl(first=0.05, longest=0.5, most=400)  # steps along the orbits of a stable range
 ON_BRANCH = 0.03  # largest distance of an orbit on a branch from the branch, in units of the system's scale
-NEARLY = 0.1  # a simulation that moves by less in its last revolution, in units of the scale, approaches an orbit
+NEARLY = 0.1  # largest motion over the last revolution, in units of the scale, of a simulation that nears an orbit
 SHORT: dict[str, Any] = {"revolutions": 8, "blocks": 1, "keep": 8, "exponents": 0}
-"""Settings of the simulations, which only lead to orbits."""
+"""Settings of the simulations, which only provide guesses."""
 Progress = Callable[[str, int, int], None]
 Scale = Callable[[float], np.ndarray]
 """Units of the state at a speed [rad/s]."""
@@ -46,9 +46,8 @@ class StableRange:
     """A stable part of a branch of synchronous orbits: a range of speed in which a machine may run.
 
     `lower` and `upper` are the bifurcations at its ends, None if the range searched or the branch ends there. `states`
-    are the orbits along it at `speeds` [rad/s], both ascending. Branches that are parts of one have the same `family`.
-    `met` simulations settled on it, `met_first` of them from the system's conventional start, the first of its initial
-    states.
+    are the orbits [SI] at `speeds` [rad/s], which ascend. Branches that are parts of one have the same `family`. `met`
+    simulations settled on it, `met_first` of them from the first of the system's initial states, the conventional one.
     """
 
     lower: Point | None
@@ -64,7 +63,7 @@ class StableRange:
 
     @property
     def width_rpm(self) -> float:
-        """Range of speed [rpm]."""
+        """Width of the range of speed [rpm]."""
         return self.upper_rpm - self.lower_rpm
 
     @property
@@ -74,12 +73,12 @@ class StableRange:
 
     @property
     def error_rpm(self) -> float:
-        """Uncertainty of the width [rpm]: the errors of its ends."""
+        """Uncertainty of the width [rpm]: the sum of the errors of its ends."""
         return sum((float(p.error_rpm) for p in (self.lower, self.upper) if p is not None), 0.0)
 
     @property
     def confirmed(self) -> bool:
-        """Whether both ends are located to less than its width."""
+        """True if the uncertainty of the width does not exceed the width."""
         return not self.error_rpm > self.width_rpm
 
     def state_at(self, speed: float) -> np.ndarray:
@@ -87,7 +86,7 @@ class StableRange:
         return np.array([np.interp(speed, self.speeds, c) for c in self.states.T])
 
     def holds(self, speed: float, state: np.ndarray, scale: np.ndarray) -> bool:
-        """Return whether the orbit `state` at `speed` lies on it, to the accuracy of the steps of a continuation."""
+        """Return True if the orbit `state` at `speed` lies on it, to the accuracy of the steps of a continuation."""
         inside = self.lower_rpm <= speed * 30 / np.pi <= self.upper_rpm
         return inside and bool(np.max(np.abs(self.state_at(speed) - state) / scale) < ON_BRANCH)
 
@@ -100,10 +99,10 @@ class StableRange:
 
 @dataclasses.dataclass(frozen=True)
 class SynchronousOrbits:
-    """All branches of synchronous orbits that were met, and their stable stretches, by the lower end.
+    """All branches of synchronous orbits that were found, and their stable stretches, by the lower end.
 
-    `sweep` holds the simulations from which the branches begin, too short for labels that tell chaos. `missed` of them
-    settled on orbits that lie on no branch.
+    `sweep` holds the simulations from which the branches were found, too short for labels that identify chaos. `missed`
+    stable orbits found from simulations lie on none of the branches.
     """
 
     branches: tuple[Branch, ...]
@@ -125,17 +124,17 @@ class SynchronousOrbits:
 
     @property
     def unsettled(self) -> int:
-        """Number of bifurcations that half the steps put elsewhere: `points` has none of them."""
+        """Number of bifurcations whose value changes too much when the steps are halved; `points` omits them."""
         return sum(p.status == "not converged" for b in self.branches for p in b.special)
 
     @property
     def unexplained(self) -> tuple[Point, ...]:
-        """Places where the stability changes and no bifurcation is found: `points` has none of them."""
+        """Places where the stability changes but no bifurcation is found; `points` omits them."""
         return tuple(p for b in self.branches for p in b.special if p.status == "unexplained")
 
     def coexisting(self, speed: float) -> list[tuple[int, bool, np.ndarray, np.ndarray]]:
-        """Return the orbits at `speed` [rad/s], to the accuracy of the continuation's steps: the number of the branch,
-        whether the orbit is stable, its state [SI] and its multipliers."""
+        """Return the orbits at `speed` [rad/s], to the accuracy of the continuation's steps: number of the branch, True
+        if stable, state [SI], multipliers."""
         found: list[tuple[int, bool, np.ndarray, np.ndarray]] = []
         for i, b in enumerate(self.branches):
             for stable, state, multipliers in _crossings(b, speed):
@@ -151,7 +150,7 @@ class SynchronousOrbits:
 
 
 def _crossings(branch: Branch, speed: float) -> list[tuple[bool, np.ndarray, np.ndarray]]:
-    """Return stability, state and multipliers where a branch passes `speed`, by linear interpolation."""
+    """Interpolate stability, state and multipliers linearly where a branch passes `speed`."""
     v, found = branch.value, []
     for k in np.flatnonzero(((v[:-1] - speed) * (v[1:] - speed) < 0) | (v[:-1] == speed)):
         share = 0.0 if v[k + 1] == v[k] else (speed - v[k]) / (v[k + 1] - v[k])
@@ -162,7 +161,7 @@ def _crossings(branch: Branch, speed: float) -> list[tuple[bool, np.ndarray, np.
 
 
 def _distinct(points: Sequence[Point]) -> tuple[Point, ...]:
-    """Return points by speed, each once."""
+    """Return converged points by speed, without duplicates."""
     kept: list[Point] = []
     for p in sorted((p for p in points if p.status == "converged"), key=lambda p: p.value):
         apart = lambda q: max(1e-6 * p.value, float(np.nan_to_num(p.error + q.error)))
@@ -185,11 +184,11 @@ def synchronous_orbits(
 ) -> SynchronousOrbits:
     """Find and follow the synchronous orbits between two speeds [rad/s].
 
-    **Arguments:** system and range; number of speeds that are simulated from each of the system's initial states, and
-    revolutions left out; a sweep that was made before, instead of simulations. Simulations from the opposites of the
-    initial states serve only to find orbits.
+    **Arguments:** system and range; number of speeds simulated from each of the system's initial states; revolutions
+    discarded; an existing sweep to use instead of simulations. Simulations from the negatives of the initial states
+    only serve to find more orbits.
 
-    **Returns:** `SynchronousOrbits`. Simulations may miss stable orbits with a small basin.
+    **Returns:** `SynchronousOrbits`. Simulations may miss stable orbits with a small basin of attraction.
     """
     require_at_least(1, count=count)
     say = progress or (lambda what, done, of: None)
@@ -232,7 +231,7 @@ def synchronous_orbits(
 
 
 class _Settled(NamedTuple):
-    """A stable orbit to which the end of a simulation led, which may have come near it before Newton's method."""
+    """A stable orbit found from a simulation; `settled` is True if the simulation itself ended near it."""
 
     state: np.ndarray
     speed: float
@@ -241,12 +240,12 @@ class _Settled(NamedTuple):
 
 
 def _finished(settled: xr.Dataset) -> list[list[int]]:
-    """Return numbers of speed and start of the simulations that ran to their end."""
+    """Return the indices (speed, initial state) of the simulations that did not fail."""
     return np.argwhere(np.all(np.isfinite(settled["last"].values), axis=-1)).tolist()
 
 
 def _stable_orbits(problem: ContinuationProblem, settled: xr.Dataset, scale: Scale) -> list[_Settled]:
-    """Return the stable orbits to which Newton's method leads from the ends of simulations, by speed."""
+    """Return the stable orbits to which Newton's method converges from the ends of simulations, by speed."""
     lanes = _finished(settled)
     last, speeds = settled["last"].values, settled["speed"].values
     met = [(last[i, j], float(speeds[i])) for i, j in lanes]
@@ -265,12 +264,11 @@ def _stable_orbits(problem: ContinuationProblem, settled: xr.Dataset, scale: Sca
 
 
 def _covers(branch: Branch, speed: float, state: np.ndarray, scale: Scale) -> bool:
-    """Return whether an orbit lies on a branch."""
     return any(np.max(np.abs(s - state) / scale(speed)) < ON_BRANCH for _, s, _ in _crossings(branch, speed))
 
 
 def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
-    """Return a number for each branch, the same for parts of one: the end of a stopped part lies on another part."""
+    """Number branches so that parts of one have the same number: the end of a stopped part lies on another part."""
     family = list(range(len(branches)))
     for i, b in enumerate(branches):
         for end, why in zip((0, -1), b.ended, strict=True):
@@ -284,7 +282,7 @@ def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
 
 
 def _stable_parts(branch: Branch, number: int, limits: tuple[float, float]) -> list[StableRange]:
-    """Return the stable parts of a branch over speed, cut to the limits [rpm]."""
+    """Return the stable parts of a branch over speed, within the limits [rpm]."""
     found = []
     edges = {p.index: p for p in branch.special if p.edge and p.status == "converged"}
     bounds = [-1, *np.flatnonzero(np.diff(branch.stable.astype(int))).tolist(), branch.value.size - 1]
@@ -302,7 +300,7 @@ def _stable_parts(branch: Branch, number: int, limits: tuple[float, float]) -> l
 
 
 def _merged(parts: Sequence[StableRange], scale: Scale) -> list[StableRange]:
-    """Return the parts with those joined that two branches from different initial states share."""
+    """Join the parts that two branches from different initial states share."""
     whole: list[StableRange] = []
     for b in sorted(parts, key=lambda p: p.lower_rpm):
         for i, a in enumerate(whole):
@@ -327,14 +325,13 @@ def stable_range(
     *,
     method: AbstractMethod | None = None,
 ) -> StableRange | None:
-    """Find the stable stretch of synchronous orbits that covers most of an operating range, by following its orbits
-    out to where they lose their stability.
+    """Find the stable stretch of synchronous orbits that covers most of an operating range, by continuation.
 
     **Arguments:** system; operating range and limits of the search [rad/s]; states and speeds near orbits, by default
     the ends of simulations at five speeds of the operating range from each of the system's initial states.
 
-    **Returns:** None if no stable orbit was found in the operating range. An end at which the stability changes without
-    a bifurcation that was located is None too, but lies within the limits.
+    **Returns:** `StableRange`, or None if no stable orbit was found in the operating range. An end is also None if the
+    stability changes within the limits but no bifurcation was located there.
     """
     scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
     problem = orbit_curves(Given(system, jnp.asarray(sum(limits) / 2)), SPEED, *limits, method)

@@ -1,13 +1,14 @@
 """Unstable ranges of the synchronous orbit, between its stable stretches, with exact edges; sources of chaotic edges.
 
-Several synchronous orbits coexist at many speeds, so a rule defines the ranges. The **principal** stretch is the one on
-which most simulations from the conventional start (a cage: at rest on the rib) settled. Stretches of its own branch
-belong to it if they overlap it or follow within a window that is closed. Others count if they do not overlap it;
-otherwise they are coexisting orbits, which a cage meets only from other initial states. The ranges are what is left.
+Several synchronous orbits coexist at many speeds, so the ranges need a definition. The **principal** stretch is the one
+on which most simulations from the conventional initial state (a cage: at rest on the rib) settled. Stretches of its own
+branch belong to it if they overlap it or are separated from it by a window that is closed. Stretches of other branches
+count if they do not overlap it; otherwise they are coexisting orbits, which a cage reaches only from other initial
+states. The unstable ranges are the complement.
 
 As for chaotic zones, stretches narrower than a stated width do not count and windows narrower than it are closed, but
-only between stretches wider than the window: a row of slivers would move an edge far from the stretch it belongs to, to
-a bifurcation that every solver puts elsewhere.
+only between stretches wider than the window: a row of very narrow ones would move an edge far from the stretch it
+belongs to, to a bifurcation whose position depends on the solver.
 
 Edges of chaotic zones, which are statistical, are compared with bifurcations and limits of cascades.
 """
@@ -28,7 +29,7 @@ from .search import StableRange, SynchronousOrbits
 
 
 CASCADE_REACH_RPM = 500.0
-"""Period doublings this far on the calm side of a chaotic edge are tried for a cascade that ends there."""
+"""Distance on the stable side of a chaotic edge within which period doublings may begin a cascade that ends there."""
 CASCADE_LEVELS = 4
 
 
@@ -36,9 +37,9 @@ CASCADE_LEVELS = 4
 class UnstableRanges:
     """Unstable ranges of the synchronous orbit between two speeds, ascending.
 
-    An edge is None if a range goes on beyond the speeds that were searched. `edges` has them by name, `zone 1 onset`,
-    `zone 1 exit`, `zone 2 onset`, ..., and `coexisting` the orbits there, as `SynchronousOrbits.coexisting` gives them.
-    `principal` is the stretch on which most simulations from the conventional start settled.
+    An edge is None if a range extends beyond the speeds searched. `edges` holds the edges by name, `zone 1 onset`,
+    `zone 1 exit`, `zone 2 onset`, ..., and `coexisting` the result of `SynchronousOrbits.coexisting` at each.
+    `principal` is the stretch on which most simulations from the conventional initial state settled.
     """
 
     zones: tuple[Zone, ...]
@@ -58,7 +59,7 @@ class UnstableRanges:
 
 
 class _Group(NamedTuple):
-    """Stretches that count as one: the one that begins lowest, the one that ends highest, and all of them."""
+    """Stretches that count as one: the lowest, the highest, and all of them."""
 
     low: StableRange
     high: StableRange
@@ -93,8 +94,10 @@ def _joined(groups: Sequence[_Group], close: float) -> list[_Group]:
 def unstable_ranges(found: SynchronousOrbits, close_below_rpm: float | None = None) -> UnstableRanges:
     """Return the unstable ranges of the synchronous orbit, between the stable stretches that were found.
 
-    **Arguments:** result of `synchronous_orbits`; width below which windows and stretches are closed [rpm], by default
-    500 rpm and at most 5 % of the highest speed. Without any stretch nothing is known of the orbit, and there is none.
+    **Arguments:** result of `synchronous_orbits`; width below which windows are closed and stretches ignored [rpm], by
+    default 500 rpm and at most 5 % of the highest speed.
+
+    **Returns:** `UnstableRanges`, without any range if no stretch was found, since the orbit is then unknown.
     """
     close_below_rpm = closing_width(found.sweep["rpm"].values) if close_below_rpm is None else close_below_rpm
     if not found.stretches:
@@ -127,7 +130,7 @@ def unstable_ranges(found: SynchronousOrbits, close_below_rpm: float | None = No
 
 
 def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) -> float:
-    """Return the share of simulations in a range that did not settle on a synchronous orbit; NaN if there are none."""
+    """Return the fraction of simulations in a range that did not settle on a synchronous orbit; NaN without any."""
     rpm = found.sweep.rpm
     inside = (rpm > (onset.speed_rpm if onset else 0.0)) & (rpm < (leaves.speed_rpm if leaves else np.inf))
     return float(np.mean(found.sweep.label[inside] != "periodic-1")) if np.any(inside) else float("nan")
@@ -135,8 +138,8 @@ def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) 
 
 @dataclasses.dataclass(frozen=True)
 class Explained:
-    """Chaotic zones with the mechanisms of their edges, and the bifurcations or cascades with which these coincide, by
-    edge, e.g. `zone 1 exit`. Other edges stay statistical."""
+    """Chaotic zones with the mechanisms of their edges, and the bifurcations or cascades that explain them by edge,
+    e.g. `zone 1 exit`; other edges remain statistical."""
 
     zones: Zones
     sources: dict[str, Point | Cascade]
@@ -145,11 +148,12 @@ class Explained:
 def explain(
     zones: Zones, found: SynchronousOrbits, system: AbstractForcedSystem, method: AbstractMethod | None = None
 ) -> Explained:
-    """Give each chaotic edge the mechanism with which it coincides, within its uncertainty and the sweep's resolution.
+    """Assign mechanisms to the chaotic edges that coincide with a bifurcation or the limit of a cascade.
 
-    A wider error bar, for mean lives near the horizon or failed trajectories, would coincide with anything. An onset
-    may be where a stable orbit ends, coming from below; an exit, where one begins. Bifurcations are tried first, then
-    the limits of cascades that begin at period doublings on the stable side. Other edges stay as they were.
+    The tolerance is the smaller of the edge's uncertainty and the sweep's resolution: a wider error bar, from mean
+    lives near the horizon or failed trajectories, would coincide with anything. An onset may be the upper end of a
+    stable orbit; an exit, the lower end. Bifurcations are tried first, then the limits of cascades that begin at period
+    doublings on the stable side.
     """
     sources: dict[str, Point | Cascade] = {}
     changed: list[Zone] = []
@@ -170,10 +174,8 @@ def explain(
 def _source(
     points: list[Point], rpm: float, near: float, calm: int, system: AbstractForcedSystem, method: AbstractMethod | None
 ) -> Point | Cascade | None:
-    """Return the point, or the cascade that begins at one, within `near` of an edge at `rpm`.
-
-    `calm` is 1 if the stable side is above the edge, and -1 if it is below.
-    """
+    """Return the point within `near` of an edge at `rpm`, or the cascade whose limit is; `calm` is 1 if the stable side
+    is above the edge, -1 if below."""
     away = lambda p: abs(p.speed_rpm - rpm)
     here = [p for p in points if away(p) <= near + np.nan_to_num(p.error_rpm)]
     if here:

@@ -1,22 +1,22 @@
-"""Integration of many lanes: the law traced in JAX, the loop over steps in machine code, and diffrax beside it.
+"""Integration of many lanes (trajectories), in machine code generated from laws traced in JAX, or by diffrax.
 
 | module        | responsibility                                                                          |
 |---------------|-----------------------------------------------------------------------------------------|
-| `program`     | a scalar function traced: its elementary operations                                     |
+| `program`     | a traced scalar function: its elementary operations                                     |
 | `ir`          | such a function as LLVM IR on vectors of lanes                                          |
 | `object_code` | compiling, storing and loading LLVM IR                                                  |
-| `layout`      | what the loop is given: methods, programs of a model, rows of its working memory        |
+| `layout`      | inputs of the loop: methods, programs of a model, rows of its working memory            |
 | `step_control`| the estimated error of a step, and the size of the next one                             |
-| `loop`        | the integration loop: lanes, strobe states, growth of tangents                          |
+| `loop`        | the integration loop: lanes, strobe states, growth of tangent vectors                   |
 | `fields`      | a model's programs for that loop; the whole bearing as a loop over its rollers          |
 | `engine`      | the engine of a model; lanes, each a design at a speed; histories                       |
 | `jax_engine`  | the engine inside JAX, for methods and laws without machine code                        |
 | `method`      | methods by name: machine code, a fixed number of steps, or adaptive steps               |
 | `solvers`     | diffrax solvers of our own: Rosenbrock, classical Runge-Kutta                           |
 | `kernel`      | a step of a method as a scalar function                                                 |
-| `xla_call`    | machine code that JAX's programs call                                                   |
+| `xla_call`    | machine code called from JAX's programs                                                 |
 | `march`       | equal steps inside JAX's programs: lanes, tangents, derivatives of any order            |
-| `strobe_map`  | the strobe map, differentiable; tangents along which the field changes too              |
+| `strobe_map`  | the strobe map, differentiable by state, speed and parameters                           |
 | `simulate`    | time histories, speed ramps                                                             |
 | `outcomes`    | results of a run, and how it ended                                                      |
 """

@@ -1,7 +1,7 @@
-"""The engine: many lanes, each a design at a speed, run from strobe state to strobe state.
+"""The engine: integration of many lanes, each a design at a speed, from strobe state to strobe state.
 
-`engine_of` makes the engine of a model: machine code, or JAX's own loop (`jax_engine`) for methods and laws that have
-none. Both take and return the same arrays.
+`engine_of` makes the engine of a model: machine code, or JAX's own loop (`jax_engine`) for methods and laws without
+machine code. Both take and return the same arrays.
 """
 
 import concurrent.futures
@@ -32,33 +32,33 @@ from .outcomes import March
 
 
 WIDTH = 8
-"""Lanes of a vector."""
+"""Number of lanes per vector."""
 MOST_AT = 1e-6
-"""Tolerance from which on a model's limit of the number of steps holds; smaller ones take more."""
+"""Smallest tolerance for which a model's maximum number of steps holds; smaller tolerances are allowed more steps."""
 LARGEST_WRITTEN_OUT = 64
-"""Dimension up to which an implicit step, whose linear solve is written out, has machine code."""
+"""Largest dimension for which implicit steps, with an unrolled linear solve, are compiled to machine code."""
 WAKES = 0.1
-"""Seconds between looks at threads that run."""
+"""Interval between checks of running threads [s]."""
 SURE = 3.0
-"""The stated error, as a multiple of the difference of two runs."""
+"""Safety factor: the stated error over the difference of two runs."""
 RETRIES = 3
-"""A lane whose error is too large is run again at most so many times, each with a tolerance 16 times smaller."""
+"""Maximum number of times that a lane with too large an error is run again, each with a 16 times smaller tolerance."""
 CHUNK = 4096
-"""Lanes that are run at a time, where a strobe state is kept of each sample."""
+"""Number of strobe states of a revolution, of all lanes together, that are computed at a time."""
 
 
 class LaneNumbers(NamedTuple):
     """The numbers of a field in each lane."""
 
     wide: Float[np.ndarray, "wide lanes"]
-    """Those that differ from lane to lane."""
+    """Numbers that differ from lane to lane."""
     shared: Float[np.ndarray, " shared"]
     slow: Float[np.ndarray, " lanes"]
-    """Factor of the most steps (`AbstractForcedSystem.slowness`)."""
+    """Factor on the maximum number of steps (`AbstractForcedSystem.slowness`)."""
 
 
 class Engine:
-    """The compiled revolutions of a model, with a number of tangent vectors."""
+    """The compiled integration loop of a model, with a number of tangent vectors."""
 
     def __init__(
         self,
@@ -68,8 +68,10 @@ class Engine:
         pair: str = "tsit5",
         samples: int = 1,
     ):
-        """**Arguments:** model; tangent vectors; true if lanes have designs of their own; method by its name in
-        `PAIRS`; strobe states of a revolution.
+        """Compile the loop.
+
+        **Arguments:** model; number of tangent vectors; `several`, True if lanes have different designs; method, by its
+        name in `PAIRS`; strobe states per revolution.
 
         **Raises:** `UnknownOperation` for a law with an operation that has no translation, or arrays of numbers.
         """
@@ -83,13 +85,12 @@ class Engine:
         self._compiled(WIDTH)
 
     def _march_of(self, width: int) -> Any:
-        """The compiled loop for vectors of so many lanes."""
+        """The compiled loop for vectors of `width` lanes."""
         whole, place = ctypes.c_int64, ctypes.c_void_p
         kind = ctypes.CFUNCTYPE(None, place, whole, whole, whole, *[place] * 6)
         return kind(function(march_ir(self.field, self._pair, width), "march"))
 
     def numbers(self, lanes: "Lanes") -> LaneNumbers:
-        """The numbers of the field in each lane."""
         found, slow = lanes.each(numbers_at, np.arange(lanes.speed.size))
         wide = np.array([x for x, w in zip(found, self._wide, strict=True) if w])
         shared = np.array([x[0] for x, w in zip(found, self._wide, strict=True) if not w], dtype=float)
@@ -97,7 +98,6 @@ class Engine:
 
     @staticmethod
     def picked(numbers: Any, lanes: Any) -> Any:
-        """The numbers of some lanes."""
         return numbers._replace(wide=numbers.wide[:, lanes], slow=numbers.slow[lanes])
 
     def __call__(
@@ -115,13 +115,13 @@ class Engine:
         threads: int = 1,
         report: Callable[[int], None] = lambda done: None,
     ) -> March:
-        """Run lanes from states in units of their scales, the values of what is integrated beside them behind.
+        """Run lanes from states in units of their scales, followed by the values of additional integrands.
 
-        **Arguments:** numbers of the lanes; states; strobe states to run to, and to keep; a method with a tolerance;
-        which sample of a revolution the first state is, of all lanes or of each; phase from strobe to strobe if it is
-        not a revolution over its samples, of all lanes or of each; tangent vectors in units of the scale; first step,
-        of all lanes or of each, NaN where the engine chooses; threads; a function that is called with the number of
-        lanes done.
+        **Arguments:** numbers of the lanes; states; number of strobe states to run, and to keep; a method with a
+        tolerance; `begin`, index of the first state among the samples of a revolution; `turn`, phase from strobe to
+        strobe if it is not a revolution over its samples; tangent vectors in units of the scale; first step, NaN for
+        the default; number of threads; function called with the number of finished lanes. `begin`, `turn` and `step`
+        hold for all lanes or are arrays over lanes.
         """
         lanes, field, rows = len(state), self.field, self._rows
         n, moving = field.dimension, field.moving
@@ -146,7 +146,7 @@ class Engine:
         settings = np.array([method.tolerance, limits.longest, limits.shortest, most])
         arrays = (queue, settings, np.append(numbers.shared, 0.0), loaded, stored, strobe, growth)
         at = [x.ctypes.data for x in arrays]
-        # A vector of one lane is faster than one of eight that holds one, where a law is large.
+        # For a large law a vector of one lane is faster than a vector of eight with a single lane in it.
         width = 1 if field.excursion is None and lanes == 1 else WIDTH
         march = self._compiled(width)
         run = lambda: march(at[0], lanes, strobes, keep, *at[1:])
@@ -172,7 +172,7 @@ class Engine:
 
 
 def _run_threads(run: Callable[[], None], count: int, queue: np.ndarray, report: Callable[[], None]) -> None:
-    """`run` in threads of its own, interrupted by Ctrl-C within a moment: the flag in `queue` empties it."""
+    """Run `run` in `count` threads; Ctrl-C sets the flag in `queue`, which stops them."""
     with concurrent.futures.ThreadPoolExecutor(count) as pool:
         try:
             left = {pool.submit(run) for _ in range(count)}
@@ -190,11 +190,8 @@ _engines: dict[Any, Engine | JaxEngine] = {}
 def engine_of(
     system: AbstractForcedSystem, tangents: int, several: bool, method: AbstractMethod, samples: int = 1
 ) -> Engine | JaxEngine:
-    """The engine of a model and a method, which is made once.
-
-    **Arguments:** model; tangent vectors; true if lanes have designs of their own; method; strobe states of a
-    revolution. A warning names an operation without machine code.
-    """
+    """Cached engine of a model and a method, with arguments as for `Engine`; it warns of an operation without machine
+    code."""
     pair = method.pair if isinstance(method, NativeSteps) else None
     if pair == IMPLICIT and not has_implicit(system):
         pair = None
@@ -210,22 +207,23 @@ def engine_of(
 
 
 def has_implicit(system: AbstractForcedSystem) -> bool:
-    """True if implicit steps of a model have machine code."""
+    """True if implicit steps of a model can be compiled to machine code."""
     return system.dimension <= LARGEST_WRITTEN_OUT and not system.beside
 
 
 def cores() -> int:
-    """Processor cores this process may use."""
+    """Number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
 
 
 def _in_arrays(design: Any) -> Any:
-    """A design with all numbers as arrays: one may be a Python number in one design and an array in another."""
+    """Design with all numbers as arrays, since one may be a Python number in one design and an array in another."""
     return jax.tree.map(lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x, design)
 
 
 class Lanes:
-    """Lanes by number, each a design at a speed."""
+    """Lanes (trajectories), each a design at a speed, from a system or `count` of them with stacked arrays, and the
+    index `which` and speed [rad/s] of each lane."""
 
     def __init__(
         self,
@@ -234,7 +232,6 @@ class Lanes:
         which: Int[np.ndarray, " lanes"],
         speed: Float[np.ndarray, " lanes"],
     ):
-        """`designs` is a system, or `count` of them with their arrays stacked."""
         self.form, rows = split(_in_arrays(designs), eqx.is_inexact_array)
         self.several, self.which, self.speed = count > 1, which, speed
         self._rows = [np.asarray(x) for x in rows]
@@ -248,7 +245,7 @@ class Lanes:
         speed: Float[np.ndarray, " lanes"],
         which: Int[np.ndarray, " lanes"] | None = None,
     ) -> "Lanes":
-        """**Raises:** `ValueError` for systems that differ in more than their numbers."""
+        """Lanes of several systems. **Raises:** `ValueError` if these differ in more than their numbers."""
         which = np.zeros(speed.size, int) if which is None else which
         if len(systems) == 1:
             return cls(systems[0], 1, which, speed)
@@ -260,7 +257,6 @@ class Lanes:
         return cls(jax.tree.map(stacked, *found), len(systems), which, speed)
 
     def at(self, some: Int[np.ndarray, " some"]) -> "Lanes":
-        """Some of the lanes."""
         few = copy.copy(self)
         few.which, few.speed, few._place = self.which[some], self.speed[some], self._place[some]
         return few
@@ -271,35 +267,33 @@ class Lanes:
         return self.form.filled([jnp.asarray(x[0] if self.several else x) for x in self._rows])
 
     def rows(self, lanes: Int[np.ndarray, " some"]) -> list[Any]:
-        """Numbers of the designs of some lanes, or those that all have."""
+        """Numbers of the designs of some lanes, or those common to all."""
         return [x[self.which[lanes]] for x in self._rows] if self.several else self._rows
 
     def numbers(self, engine: Engine | JaxEngine, some: Int[np.ndarray, " some"]) -> Any:
-        """The numbers of some lanes as the engine takes them; they are worked out once for all lanes."""
+        """Numbers of some lanes as the engine takes them, computed once for all lanes."""
         if type(engine) not in self._numbers:
             self._numbers[type(engine)] = engine.numbers(self._all)
         return engine.picked(self._numbers[type(engine)], self._place[some])
 
     def engine(self, tangents: int, method: AbstractMethod, samples: int = 1) -> Engine | JaxEngine:
-        """The engine of these lanes with a number of tangent vectors."""
         return engine_of(self.system, tangents, self.several, method, samples)
 
     def completed(self, y: Float[np.ndarray, "some dim"]) -> Float[np.ndarray, "some numbers"]:
-        """States with the values of what is integrated beside them at the beginning of a run behind."""
+        """States followed by the initial values of additional integrands."""
         beside = np.array(self.system.beside_start, dtype=float)
         return np.concatenate([y, np.broadcast_to(beside, (len(y), beside.size))], axis=1)
 
     def begin(
         self, some: Int[np.ndarray, " some"], y: Float[np.ndarray, "some numbers"]
     ) -> tuple[Float[np.ndarray, "some numbers"], Float[np.ndarray, " some"]]:
-        """Scale of each of some lanes, 1 for what is integrated beside the state, and excursion of its state."""
+        """Scale of each of some lanes, 1 for additional integrands, and excursion of its state."""
         dim = self.system.dimension
         scale, excursion = self.each(_scale_and_excursion, some, y[:, :dim])
         return np.concatenate([scale, np.ones((some.size, y.shape[1] - dim))], axis=1), excursion
 
     def each(self, f: Callable[..., Any], some: Int[np.ndarray, " some"], *arrays: np.ndarray) -> Any:
-        """`f(model, speed, ...)` of some lanes, a function of a module; arrays have the lanes first. It is compiled for
-        few numbers of lanes, the powers of 8."""
+        """Evaluate a module-level `f(model, speed, ...)` for some lanes, compiled for few sizes (the powers of 8)."""
         room = 8 ** max(1, -(-(some.size - 1).bit_length() // 3))
         filled = lambda x: np.concatenate([x, np.broadcast_to(x[-1:], (room - some.size, *x.shape[1:]))])
         rows = [jnp.asarray(x) for x in self.rows(filled(some))]
@@ -329,9 +323,11 @@ def histories(
     revolutions: int,
     method: AbstractMethod,
 ) -> tuple[Float[np.ndarray, "lanes samples dim"], Float[np.ndarray, " lanes"]]:
-    """States of lanes at so many phases of each of some revolutions, the first where they begin, in SI units; and the
-    largest error of a revolution [scale]. NaN where one begins nowhere, or fails. A lane whose error is larger than the
-    method allows is run again with finer steps."""
+    """States of lanes [SI] at `samples` phases of each of `revolutions`, and the largest error of a revolution [scale].
+
+    The first state is the initial one. Lanes that fail, or have a NaN in it, are NaN. Those with a larger error than
+    the method allows are run again with smaller steps.
+    """
     total, size = samples * revolutions, CHUNK // samples + 1
     seen, error = np.full((lanes.speed.size, total, y0.shape[1]), np.nan), np.full(lanes.speed.size, np.nan)
     todo = np.flatnonzero(np.all(np.isfinite(y0), axis=1))
@@ -359,11 +355,8 @@ def errors_of_parts(
     method: AbstractMethod,
     **more: Any,
 ) -> Float[np.ndarray, "lanes parts"]:
-    """Error of each part of a run [scale]: three times the distance of its end from that by the method's reference.
-
-    **Arguments:** engine; numbers of the lanes; states [scale] from part to part; dimension; method of the run; more
-    for the engine, of each part.
-    """
+    """Error of each part of a run between `states` [scale]: three times the distance of its end from that by the
+    method's reference; `more` are arguments of the engine for each part."""
     count, parts = states.shape[0], states.shape[1] - 1
     begins, given = (
         states[:, :-1].reshape(count * parts, -1),
@@ -377,7 +370,7 @@ def errors_of_parts(
 def errors_of_stretches(
     apart: Float[np.ndarray, "*lanes parts"], stretch: int, method: AbstractMethod
 ) -> Float[np.ndarray, "*lanes stretches"]:
-    """Errors of a number of parts together: their sum, and the tolerance at least."""
+    """Error of each group of `stretch` parts: the sum of theirs, and at least the tolerance."""
     padded = np.pad(apart, [(0, 0)] * (apart.ndim - 1) + [(0, -apart.shape[-1] % stretch)])
     summed = padded.reshape(*apart.shape[:-1], -1, stretch).sum(axis=-1)
     return np.maximum(summed, getattr(method, "tolerance", 0.0))

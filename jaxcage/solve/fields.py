@@ -1,4 +1,4 @@
-"""Programs of a model for the integration loop, traced in JAX: its rates, excursion and steps, and their numbers."""
+"""Programs of a model for the integration loop, traced in JAX: rates, excursion and steps, and their numbers."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -30,13 +30,13 @@ from .solvers import rosenbrock_step
 
 
 SAMPLED = 2
-"""Fixed numbers of a field with several strobe states to a revolution: the angle between two, and which is the first.
+"""Number of extra fixed numbers for several strobe states per revolution: the angle between two, and the first index.
 """
 PASSED, NORMAL = len(Passed._fields), Passed._fields.index("normal")
 
 
 def _traced(f: Callable[[Any, Any, Any], Any], moved: int, fixed: int) -> Program:
-    """The program of a function of (phase, what moves, fixed numbers)."""
+    """Program of a function of (phase, integrated numbers, fixed numbers)."""
     return program_of(lambda phase, moved, _, fixed: (f(phase, moved, fixed), ()), Sizes(moved, 0, fixed))
 
 
@@ -45,7 +45,7 @@ def _floats(numbers: Any) -> tuple[Any, ...]:
 
 
 def _with_tangents(go: Callable[[Any], Any], numbers: Any, size: int, tangents: int) -> tuple[Any, ...]:
-    """Values of `go`, their tangents along the vectors behind the first `size` numbers, and what is seen."""
+    """Values of `go`, their tangents along the vectors after the first `size` numbers, and its auxiliary results."""
     y, out = tuple(numbers[:size]), []
     values, seen = go(y)
     for k in range(1, 1 + tangents):
@@ -55,7 +55,7 @@ def _with_tangents(go: Callable[[Any], Any], numbers: Any, size: int, tangents: 
 
 
 def _hoisted(program: Program, moving: int) -> tuple[Program, Program]:
-    """A program as one of the fixed numbers alone, and one that takes that one's results behind the fixed numbers."""
+    """Split a program into one of the fixed numbers alone, and one with that one's results as further arguments."""
     jaxpr = program.jaxpr
     known, early = {*jaxpr.invars[1 + moving :], *jaxpr.constvars}, []
     for e in jaxpr.eqns:
@@ -67,7 +67,7 @@ def _hoisted(program: Program, moving: int) -> tuple[Program, Program]:
     wanted = {v for e in late for v in e.invars if is_variable(v)} | {v for v in jaxpr.outvars if is_variable(v)}
     numbers = []
     for e in reversed(early):
-        if e.outvars[0] in wanted and e.outvars[0].aval.dtype != np.dtype(float):  # masks and integers are made again
+        if e.outvars[0] in wanted and e.outvars[0].aval.dtype != np.dtype(float):  # recompute masks and integers
             late = [e, *late]
             wanted |= {v for v in e.invars if is_variable(v)}
         else:
@@ -79,8 +79,8 @@ def _hoisted(program: Program, moving: int) -> tuple[Program, Program]:
 
 
 def _pieces(system: AbstractForcedSystem, speed: Any) -> tuple[Form, list[Any]]:
-    """Field, system and scale at a speed, and their numbers; of a whole bearing the scale of one roller and the bodies,
-    and no system."""
+    """Field, system and scale at a speed, and their numbers; for a whole bearing no system, and the scale of only one
+    roller and the bodies."""
     field, scale = system.at_speed(speed), system.scale(speed)
     if system.beside:
         short = tuple(scale[i] for i in (*range(OF_ROLLER), *range(-OF_BODIES, 0)))
@@ -89,13 +89,13 @@ def _pieces(system: AbstractForcedSystem, speed: Any) -> tuple[Form, list[Any]]:
 
 
 def numbers_at(system: AbstractForcedSystem, speed: Any) -> tuple[list[Any], Any]:
-    """The numbers of the field at a speed, and the factor of the most steps (`AbstractForcedSystem.slowness`)."""
+    """Numbers of the field at a speed, and the factor on the number of steps (`AbstractForcedSystem.slowness`)."""
     return _pieces(system, speed)[1], system.slowness(speed)
 
 
 def shape_of_numbers(system: AbstractForcedSystem, several: bool) -> tuple[Form, tuple[bool, ...]]:
-    """The form of field, system and scale, and which of their numbers differ from lane to lane: those that follow from
-    the speed, or all of `several` designs.
+    """Form of field, system and scale, and True for those of their numbers that differ from lane to lane: those that
+    depend on the speed, or all for `several` designs.
 
     **Raises:** `UnknownOperation` for arrays of numbers.
     """
@@ -116,7 +116,7 @@ def traced_field(
     sampled: bool = False,
     implicit: bool = False,
 ) -> Field:
-    """The programs of a system, with a strobe state for each revolution or, if it is `sampled`, several."""
+    """Programs of a system, with one strobe state per revolution or, if `sampled`, several."""
     if system.beside:
         return bearing_field(form, (True,) * SAMPLED + wide, system.dimension, tangents)
     n, skip, moving = system.dimension, SAMPLED * sampled, system.dimension * (1 + tangents)
@@ -133,8 +133,8 @@ def traced_field(
         return (*pushed[0][0], *(c for _, each in pushed for c in each))
 
     def step(phase: Any, moved: Any, fixed: Any) -> Any:
-        """A step of the Rosenbrock method, in units of the scale: moved are its length, the state and tangent vectors;
-        results are the same at its end, and their estimated errors."""
+        """Rosenbrock step in units of the scale: from its length, state and tangent vectors to state and tangent
+        vectors at its end, and their estimated errors."""
         (field, _, scale), (h, *y) = pieces(fixed), moved
 
         def go(y: Any) -> Any:
@@ -163,16 +163,16 @@ def traced_field(
 
 
 class RollersCode(NamedTuple):
-    """The programs of a bearing, which write the code of its rates as a loop over the rollers."""
+    """Programs of a bearing, and the code of its rates as a loop over the rollers."""
 
     rollers: int
     roller: Program
     bodies: Program
     angle: Program
-    """Cosine and sine of the cage's angle."""
+    """Program for the cosine and sine of the cage's angle."""
 
     def code(self, field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
-        """The function `rates`: of state, tangents and what is integrated beside at `place`, stored at `out`."""
+        """Code of `rates`, from state, tangents and additional integrands at `place` to their rates at `out`."""
         w = Code(width)
         z, size, tangents = self.rollers, field.dimension, field.tangents
         load = lambda first, count: [w.get(first + k, base="%place") for k in range(count)]
@@ -181,7 +181,7 @@ class RollersCode(NamedTuple):
         cos, sin = w.program(self.angle, [number(0.0), phase])
         places = 2 * np.pi / z * np.arange(z)
         table = ", ".join(f"double {number(x).text}" for pair in zip(np.cos(places), np.sin(places)) for x in pair)
-        # Of values and of tangents MOVING sums each, then the other sums, then the largest force and slip.
+        # MOVING sums for the values and for each tangent, then the other sums, then the largest force and slip.
         moving, others = MOVING * (1 + tangents), PASSED - MOVING
         begin = w.block
         w.line("br label %roller")
@@ -244,13 +244,13 @@ class RollersCode(NamedTuple):
 
 
 def bearing_field(form: Form, wide: tuple[bool, ...], dimension: int, tangents: int) -> Field:
-    """The programs of a whole bearing: the forces on a roller are traced once, as a function of that roller, cage and
-    ring; the code runs it for each roller in turn and adds up what the rollers pass on."""
+    """Programs of a whole bearing: the forces on a roller are traced once, as a function of that roller, cage and ring;
+    the code evaluates it for each roller and adds up the contributions to the bodies."""
 
     def roller(_: Any, moved: Any, fixed: Any) -> Any:
-        """Rates of a roller, and what it passes on to the bodies.
+        """Rates of a roller, and its contributions to the bodies.
 
-        Moved are cosine and sine of the pocket's angle in the cage, those of the cage's angle, the numbers of the
+        `moved` holds cosine and sine of the pocket's angle in the cage, those of the cage's angle, the numbers of the
         roller and the bodies, and the tangents of both. Results are rates and the first `MOVING` of `Passed`, the
         tangents of these, the rest of `Passed`, and the slip.
         """
@@ -269,10 +269,10 @@ def bearing_field(form: Form, wide: tuple[bool, ...], dimension: int, tangents: 
         return _with_tangents(go, numbers, OF_ROLLER + OF_BODIES, tangents)
 
     def bodies(_: Any, moved: Any, fixed: Any) -> Any:
-        """Rates of cage and ring, of the quantities beside the state, and what is watched.
+        """Rates of cage, ring and additional integrands, and the watched quantities.
 
-        Moved are cosine and sine of the cage's angle, the numbers of the bodies and the sums over all rollers that move
-        them, the tangents of both, the other sums, and the largest pocket force and slip.
+        `moved` holds cosine and sine of the cage's angle, the numbers of the bodies and the sums over all rollers that
+        move them, the tangents of both, the other sums, and the largest pocket force and slip.
         """
         (cos, sin), numbers, (normal, slip) = moved[:2], moved[2:-2], moved[-2:]
         at, _, scale = form.filled(fixed[SAMPLED:])

@@ -1,8 +1,8 @@
-"""LLVM IR of a traced scalar function, written for vectors of lanes.
+"""LLVM IR of a traced scalar function, for vectors of lanes.
 
-A number that all lanes share stays a scalar, every other one is a vector with an element for each lane. What only one
-side of a `select` needs is computed only if some lane of the vector takes that side (`branches`): the contact force,
-say, is skipped while no cage of the vector touches its land.
+A number common to all lanes remains a scalar; every other one is a vector with an element per lane. Operations that are
+needed on only one side of a `select` are skipped if no lane of the vector takes that side (`branches`): for instance
+the contact force, while no cage of the vector touches its land.
 """
 
 import functools
@@ -17,12 +17,12 @@ import numpy as np
 
 
 FLAGS = "nsz arcp contract"
-"""Licence of LLVM's optimiser: fuse multiplications and additions, divide by multiplying, ignore the sign of zero. NaN
-and infinity keep their meaning."""
+"""Flags that let LLVM fuse multiplications and additions, divide by multiplying, and ignore the sign of zero; NaN and
+infinity keep their meaning."""
 WORTH_A_BRANCH = 12
-"""Operations that must be saved for a branch to pay."""
+"""Smallest cost of the operations under a branch that is worth it."""
 COST = {"div": 6, "sqrt": 6, "rsqrt": 6, "exp": 20, "log": 20, "sin": 20, "cos": 20, "tan": 20, "pow": 40, "atan2": 40}
-"""Operations that count as several."""
+"""Cost of expensive operations; others cost 1."""
 ARITHMETIC = {"add": "add", "add_any": "add", "sub": "sub", "mul": "mul", "div": "div", "rem": "rem"}
 COMPARISONS = {"lt": "lt", "le": "le", "gt": "gt", "ge": "ge", "eq": "eq", "ne": "ne"}
 SHIFTS = {"shift_left": "shl", "shift_right_logical": "lshr", "shift_right_arithmetic": "ashr"}
@@ -32,19 +32,19 @@ INTRINSICS = {**dict(zip(SAME_NAME, SAME_NAME)), "abs": "fabs"}
 CASTS = {("double", "i64"): "fptosi", ("i64", "double"): "sitofp", ("i1", "double"): "uitofp", ("i1", "i64"): "zext"}
 
 WRITTEN_OUT = 48
-"""Rows up to which the code of a loop over them is written out."""
+"""Largest number of rows for which a loop over them is unrolled."""
 
 Path = tuple[tuple[Any, int], ...]
-"""Masks, and the value of each for which something is needed."""
+"""Masks, and the value of each, under which a variable is needed."""
 
 
 class UnknownOperation(Exception):
-    """A traced function uses an operation that has no translation; the argument is its name."""
+    """Error for an operation without a translation, with its name as argument."""
 
 
 @functools.cache
 def say_once(operation: str) -> None:
-    """Warn of an operation that has no translation."""
+    """Warn once of an operation that has no translation."""
     warnings.warn(
         f"The law uses the operation `{operation}`, which has no machine code here: JAX's own loop is taken instead, "
         "which is slower.",
@@ -53,12 +53,12 @@ def say_once(operation: str) -> None:
 
 
 def is_variable(atom: Any) -> bool:
-    """True for a variable of a jaxpr, false for a literal."""
+    """True for a variable of a jaxpr, False for a literal."""
     return not isinstance(atom, jex.core.Literal)
 
 
 def branches(equations: Sequence[Any], results: Sequence[Any]) -> dict[Any, Path]:
-    """For each variable the masks under which it is needed; () for a variable that is always needed."""
+    """Masks under which each variable is needed; () for a variable that is always needed."""
     path: dict[Any, Path] = {v: () for v in results if is_variable(v)}
     for e in reversed(equations):
         own = path[e.outvars[0]]
@@ -67,7 +67,7 @@ def branches(equations: Sequence[Any], results: Sequence[Any]) -> dict[Any, Path
                 always = e.primitive.name != "select_n" or k == 0 or any(m is e.invars[0] for m, _ in own)
                 needed = own if always else (*own, (e.invars[0], k - 1))
                 path[v] = _common(path[v], needed) if v in path else needed
-    kinds = dict.fromkeys(path[e.outvars[0]] for e in equations)  # in their order: code must be the same every time
+    kinds = dict.fromkeys(path[e.outvars[0]] for e in equations)  # ordered, so that the code is reproducible
     for p in sorted(dict.fromkeys(p[:n] for p in kinds for n in range(1, len(p) + 1)), key=len, reverse=True):
         inside = [e for e in equations if path[e.outvars[0]][: len(p)] == p]
         if sum(COST.get(e.primitive.name, 1) for e in inside) < WORTH_A_BRANCH:
@@ -76,13 +76,13 @@ def branches(equations: Sequence[Any], results: Sequence[Any]) -> dict[Any, Path
 
 
 def _common(a: Path, b: Path) -> Path:
-    """The beginning that two paths share."""
+    """Common beginning of two paths."""
     n = next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
     return a[:n]
 
 
 def in_groups(equations: Sequence[Any], path: dict[Any, Path]) -> list[tuple[Path, list[Any]]]:
-    """The equations in groups of one path each, as few as possible; what is always needed comes first."""
+    """Equations in as few groups of one path each as possible; those that are always needed come first."""
     made = {v: i for i, e in enumerate(equations) for v in e.outvars}
     paths = [path[e.outvars[0]] for e in equations]
     waits, readers = [0] * len(equations), [[] for _ in equations]
@@ -111,7 +111,7 @@ def in_groups(equations: Sequence[Any], path: dict[Any, Path]) -> list[tuple[Pat
 
 
 class Value(NamedTuple):
-    """An operand: its text, its scalar type, and whether it is a vector of lanes."""
+    """An operand: its text, its scalar type, and `wide`, True for a vector of lanes."""
 
     text: str
     kind: str
@@ -119,12 +119,11 @@ class Value(NamedTuple):
 
     @property
     def known(self) -> bool:
-        """True for a number that is written out."""
+        """True for a literal."""
         return not self.text.startswith("%")
 
 
 def number(x: Any) -> Value:
-    """A constant."""
     x = np.asarray(x)
     if x.dtype == bool:
         return Value("true" if x else "false", "i1", False)
@@ -134,13 +133,11 @@ def number(x: Any) -> Value:
 
 
 class Code:
-    """Lines of a function's body. An operation is one on vectors where any of its operands is a vector.
-
-    Vectors are kept in rows of memory. A row is a number, or a value within a loop over rows.
-    """
+    """Lines of a function's body; an operation is on vectors if any of its operands is a vector. Vectors are stored in
+    rows of memory; a row is a number, or a value within a loop over rows."""
 
     block = "entry"
-    """The block that is being written."""
+    """Name of the current block."""
 
     def __init__(self, width: int):
         self.width, self.lines, self.names, self.declarations = width, [], 0, set[str]()
@@ -162,7 +159,7 @@ class Code:
         return Value(f"%v{self.names}", kind, wide)
 
     def widened(self, v: Value) -> Value:
-        """A scalar as a vector of equal elements."""
+        """Broadcast a scalar to a vector."""
         if v.wide:
             return v
         if v.known:
@@ -172,17 +169,17 @@ class Code:
         return self.let(f"shufflevector {self.typed(one)}, {self.typed(one)}, {zeros}", v.kind, True)
 
     def alike(self, x: Sequence[Value]) -> list[Value]:
-        """Operands of one shape."""
+        """Broadcast operands to one shape."""
         return [self.widened(v) for v in x] if any(v.wide for v in x) else list(x)
 
     def simple(self, op: str, *operands: Value, kind: str | None = None) -> Value:
-        """An instruction whose operands are all of one type."""
+        """Write an instruction whose operands are all of one type."""
         x = self.alike(operands)
         rest = "".join(f", {v.text}" for v in x[1:])
         return self.let(f"{op} {self.typed(x[0])}{rest}", kind or x[0].kind, x[0].wide)
 
     def call(self, name: str, *operands: Value) -> Value:
-        """A call of one of LLVM's functions of numbers."""
+        """Write a call of one of LLVM's intrinsic functions."""
         x = self.alike(operands)
         t = self.type(x[0].kind, x[0].wide)
         full = f"llvm.{name}.{f'v{self.width}' if x[0].wide else ''}{'f64' if x[0].kind == 'double' else x[0].kind}"
@@ -208,7 +205,7 @@ class Code:
         return self.arithmetic("div", a, b)
 
     def compare(self, op: str, a: Value, b: Value) -> Value:
-        """A comparison; every one with NaN is false but `ne`."""
+        """Write a comparison; with NaN all but `ne` are false."""
         if a.kind == "double":
             return self.simple(f"fcmp {'une' if op == 'ne' else 'o' + op}", a, b, kind="i1")
         if a.kind == "i1":
@@ -227,15 +224,15 @@ class Code:
         return self.let(f"select {flags}{self.typed(mask)}, {self.typed(yes)}, {self.typed(no)}", yes.kind, yes.wide)
 
     def larger(self, a: Value, b: Value) -> Value:
-        """The larger number; b where a is NaN."""
+        """Larger of two numbers; b where a is NaN."""
         return self.select(self.compare("gt", a, b), a, b)
 
     def smaller(self, a: Value, b: Value) -> Value:
-        """The smaller number; b where a is NaN."""
+        """Smaller of two numbers; b where a is NaN."""
         return self.select(self.compare("lt", a, b), a, b)
 
     def extreme(self, op: str, a: Value, b: Value) -> Value:
-        """The larger (`gt`) or smaller (`lt`) number, NaN if either is."""
+        """Larger (`gt`) or smaller (`lt`) of two numbers, NaN if either is."""
         if a.known or b.known:
             known, other = (a, b) if a.known else (b, a)
             return self.select(self.compare(op, known, other), known, other)
@@ -250,7 +247,7 @@ class Code:
         return half if n == 1 or n % 2 == 0 else self.mul(half, x)
 
     def any(self, mask: Value) -> Value:
-        """True if a mask holds for some lane."""
+        """True if a mask holds for any lane."""
         if not mask.wide:
             return mask
         bits = self.let(f"bitcast {self.typed(mask)} to i{self.width}", f"i{self.width}", False)
@@ -260,10 +257,7 @@ class Code:
         return self.let(f"{op} {self.typed(x)} to {self.type(kind, x.wide)}", kind, x.wide)
 
     def equation(self, e: Any, x: list[Value]) -> Value:
-        """The result of one operation of a jaxpr.
-
-        **Raises:** `UnknownOperation`.
-        """
+        """Result of one operation of a jaxpr. **Raises:** `UnknownOperation`."""
         name = e.primitive.name
         if name in ARITHMETIC:
             return self.arithmetic(ARITHMETIC[name], *x)
@@ -297,7 +291,7 @@ class Code:
             return self.call("copysign", root, x[0])
         if name == "rsqrt":
             return self.div(number(1.0), self.call("sqrt", *x))
-        if name == "log1p":  # W. Kahan's form, exact where 1 + x is rounded
+        if name == "log1p":  # W. Kahan's form, accurate although 1 + x is rounded
             u = self.add(x[0], number(1.0))
             quotient = self.div(self.mul(x[0], self.call("log", u)), self.sub(u, number(1.0)))
             return self.select(self.compare("eq", u, number(1.0)), x[0], quotient)
@@ -325,7 +319,7 @@ class Code:
         raise UnknownOperation(name)
 
     def program(self, program: Any, arguments: Sequence[Value]) -> list[Value]:
-        """The results of a traced function."""
+        """Write a traced function; return its results."""
         jaxpr = program.jaxpr
         known: dict[Any, Value] = dict(zip(jaxpr.invars, arguments, strict=True))
         known |= {v: number(c) for v, c in zip(jaxpr.constvars, program.consts, strict=True)}
@@ -350,12 +344,12 @@ class Code:
         return [read(v) for v in jaxpr.outvars]
 
     def taken(self) -> str:
-        """The lines written since the last call."""
+        """Text of the lines written since the last call."""
         lines, self.lines = self.lines, []
         return "\n".join(lines)
 
     def function(self, name: str, arguments: str) -> tuple[str, set[str]]:
-        """The lines written as a function, and what it needs declared."""
+        """Text of the lines written as a function, and its declarations."""
         head = f"define internal void @{name}({arguments}) noinline {{\nentry:\n"
         return f"{head}{self.taken()}\n  ret void\n}}\n", self.declarations
 
@@ -379,10 +373,8 @@ class Code:
     def over(
         self, count: int, begin: Sequence[Value], body: Callable[[Callable[[int], int | Value], list[Value]], Any]
     ) -> list[Value]:
-        """Apply `body` to `begin` and its results, row after row: written out if they are few, else as a loop.
-
-        `body(row, values)` returns new values; `row(k)` is the row of its number behind the k-th.
-        """
+        """Apply `body(row, values)` to `begin` and then to its results, for `count` rows, unrolled if they are few;
+        `row(k)` is the k-th row plus the number of the present pass."""
         rest = lambda new: [] if new is None else list[Value](new)
         values = [self.widened(v) for v in begin]
         if count <= WRITTEN_OUT:
@@ -412,22 +404,22 @@ class Code:
         return new
 
     def shared(self, k: int) -> Value:
-        """A fixed number that is the same in all lanes."""
+        """Load a fixed number that is common to all lanes."""
         at = self.let(f"getelementptr double, ptr %shared, i64 {k}", "ptr", False)
         return self.let(f"load double, ptr {at.text}", "double", False)
 
     def log2(self, x: Value) -> Value:
-        """The binary logarithm of a positive number, within 0.09."""
+        """Binary logarithm of a positive number, within 0.09."""
         bits = self.convert("bitcast", self.convert("fptrunc", x, "float"), "i32")
         return self.sub(self.mul(self.convert("sitofp", bits, "double"), number(2.0**-23)), number(127.0))
 
     def exp2(self, x: Value) -> Value:
-        """Two to the power x, within 6 %; the inverse of `log2`."""
+        """Two to the power of x, within 6 %; the inverse of `log2`."""
         bits = self.convert("fptosi", self.mul(self.add(x, number(127.0)), number(2.0**23)), "i32")
         return self.convert("fpext", self.convert("bitcast", bits, "float"), "double")
 
     def store_if(self, mask: Value, x: Value, base: str, index: Value) -> None:
-        """x to base[index] in the lanes where the mask holds."""
+        """Store x at base[index] in the lanes where the mask holds."""
         at = self.let(f"getelementptr double, ptr {base}, {self.typed(index)}", "ptr", True)
         v, m = self.type("double", True), self.type("i1", True)
         name = f"@llvm.masked.scatter.v{self.width}f64.v{self.width}p0"

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .engine import Lanes
 
 UNIT, MOST = 8, 256
-"""Lanes of a call are a multiple of the first, up to the second: each size is compiled by itself."""
+"""Granularity and maximum of the number of lanes per call: each size is compiled separately."""
 
 
 @compiled
@@ -36,7 +36,7 @@ def _strobe(
     tangents: Float[Array, "lanes tangents dim"],
     i: Int[Array, " lanes"],
 ) -> tuple[Array, Array, Array, Array]:
-    """Lanes from the i-th to the next strobe state of a revolution, in units of their scales."""
+    """Advance lanes from the i-th to the next strobe state of a revolution, in units of their scales."""
 
     def lane(own: Any, y: Array, tangents: Array, i: Array) -> tuple[Array, Array, Array, Array]:
         speed, *numbers = own
@@ -54,8 +54,7 @@ def _strobe(
 def _orthonormalised(
     tangents: Float[np.ndarray, "lanes tangents dim"],
 ) -> tuple[Float[np.ndarray, "lanes tangents dim"], Float[np.ndarray, "lanes tangents"]]:
-    """Orthonormal tangent vectors, and the logarithms of the lengths that are left of each beside those before it: of
-    one that has turned into them, of the rounding."""
+    """Orthonormal tangent vectors, and the logarithm of each one's length orthogonal to those before (or rounding)."""
     columns = np.swapaxes(tangents, 1, 2)
     directions, products = np.linalg.qr(columns)
     length = np.diagonal(products, axis1=1, axis2=2)
@@ -66,21 +65,19 @@ def _orthonormalised(
 
 
 class JaxEngine:
-    """The revolutions of a model inside JAX, with a number of tangent vectors; called as the engine in machine code."""
+    """Integration loop of a model inside JAX, called like `Engine`; `samples` are strobe states per revolution."""
 
     def __init__(self, system: AbstractForcedSystem, tangents: int, several: bool, samples: int = 1):
-        """`samples` is the number of strobe states of a revolution."""
         self._form, _ = split(system, eqx.is_inexact_array)
         self._several, self._tangents, self._samples = several, tangents, samples
 
     def numbers(self, lanes: "Lanes") -> Any:
-        """The numbers that lanes have of their own, and those that all share."""
+        """Numbers of each lane, and those common to all."""
         rows = lanes.rows(np.arange(lanes.speed.size))
         return ([lanes.speed, *rows], []) if self._several else ([lanes.speed], [jnp.asarray(x) for x in rows])
 
     @staticmethod
     def picked(numbers: Any, lanes: Int[np.ndarray, " some"]) -> Any:
-        """The numbers of some lanes."""
         return [x[lanes] for x in numbers[0]], numbers[1]
 
     def __call__(
@@ -97,7 +94,7 @@ class JaxEngine:
         threads: int = 1,
         report: Callable[[int], None] = lambda done: None,
     ) -> March:
-        """Run lanes as `Engine` does; the solver chooses its first step itself."""
+        """Run lanes like `Engine`, but with the first step chosen by the solver."""
         own, shared = numbers
         (lanes, dim), y, m = state.shape, state.copy(), self._tangents
         t = np.zeros((lanes, 0, dim)) if tangents is None else tangents.copy()

@@ -1,7 +1,4 @@
-"""One step of a method as plain scalar code, for `march`.
-
-The numbers of field, system and scale are what is fixed; the rest (structure, tableau) is the step's own.
-"""
+"""One step of a method as scalar code, for `march`: the numbers of field, system and scale are its fixed numbers."""
 
 import dataclasses
 import functools
@@ -25,8 +22,8 @@ from .solvers import Rodas4, explicit_step, rosenbrock_step
 Parts = Int[Array, ""] | Scalar
 """Number of equal parts of a revolution."""
 Tangents = Sequence[tuple[State, Sequence[Any] | None]]
-"""Tangent vectors in units of the state, each with the tangents of the field's numbers in the order of its leaves, None
-where there are none."""
+"""Tangent vectors in units of the state, each with the tangents of the field's numbers in the order of its leaves (None
+for zero)."""
 
 
 class Pieces(NamedTuple):
@@ -38,28 +35,25 @@ class Pieces(NamedTuple):
 
 
 def can_be_kernel(solver: Any) -> bool:
-    """True if a step of `solver` is a plain formula, as of ours, and of explicit methods whose last stage is kept."""
+    """True if a step of `solver` is a closed formula: `Rodas4`, and explicit methods with FSAL (first same as last)."""
     if isinstance(solver, dfx.AbstractERK):
         return isinstance(solver.tableau, dfx.ButcherTableau) and solver.tableau.fsal
     return isinstance(solver, Rodas4)
 
 
 NEARNESS = 0.2
-"""Time to a place of abrupt change [rad], at the pace of the moment, at which steps are half as long."""
+"""Time to an abrupt change of the law [rad], at the present speed, at which steps are half as long."""
 FAR = 0.5
-"""Time [rad] from which on they are not shortened."""
+"""Time to an abrupt change [rad] beyond which steps are not shortened."""
 SHORTEST = 1 / 1024
 """Smallest allowed step, as a fraction of the nominal step."""
 MORE = 8
-"""Steps are added by so many parts of a revolution's, until all lanes are through."""
+"""Divisor of the nominal number of steps that gives the number added at a time, until all lanes reach the end."""
 
 
 def shortened(h: Scalar, near: Any, phase: Scalar, end: Scalar) -> Scalar:
-    """The step from `phase`, of the size h far from abrupt changes, by the distance from the nearest and the speed
-    towards it (`AbstractForcedSystem.abrupt`); the last one ends at `end`, and is 0 beyond it.
-
-    It has no derivative: the mesh is what it is while the state on it is differentiated.
-    """
+    """Step size at `phase`: h, shortened `near` an abrupt change of the law (`AbstractForcedSystem.abrupt`) and to end
+    at `end`, beyond which it is 0. It has no derivative: the state is differentiated on a fixed mesh."""
     distance, speed = near
     short = h * distance / (distance + NEARNESS * jnp.maximum(speed - distance / FAR, 0.0))
     short = jnp.maximum(short, SHORTEST * h)
@@ -69,12 +63,12 @@ def shortened(h: Scalar, near: Any, phase: Scalar, end: Scalar) -> Scalar:
 
 @functools.partial(jax.jit, static_argnums=0)
 def evaluated_often(structure: Form, numbers: Numbers, tau: Scalar, y: State) -> State:
-    """The field of a structure of (field, system, scale)."""
+    """Evaluate the field of a structure of (field, system, scale)."""
     return structure.filled(numbers)[0](tau, y)
 
 
 class _CalledField(AbstractField):
-    """A field that a step evaluates several times, as calls of one function."""
+    """Field whose evaluations within a step are calls of one function."""
 
     structure: Form = eqx.field(static=True)
     numbers: Numbers
@@ -88,16 +82,16 @@ class _CalledField(AbstractField):
 
 @dataclasses.dataclass(frozen=True)
 class KernelStep:
-    """One step for `march`: moved is the state; watched the largest excursion and, where steps are shortened, the
-    phase; fixed the first phase, the step, the phase at the end, and the numbers of (field, system, scale)."""
+    """One step for `march`: moved is the state; watched are the largest excursion and, if steps are shortened, the
+    phase; fixed are the first phase, step size, final phase, and the numbers of (field, system, scale)."""
 
     solver: Any
     structure: Form
     abrupt: bool
-    """True if the law changes abruptly somewhere: steps are shortened there."""
+    """True if the law has abrupt changes, near which steps are shortened."""
 
     def watched(self, phase: Any) -> Numbers:
-        """First values of the watched numbers: the excursion and the phase."""
+        """Initial values of the watched numbers: the excursion and the phase."""
         zero = jnp.zeros(())
         return (zero, zero + phase) if self.abrupt else (zero,)
 
@@ -115,22 +109,20 @@ class KernelStep:
             y, step = explicit_step(self.solver.tableau, field, t0, size, moved)
         else:
             y, _, _, step = rosenbrock_step(field, t0, size, moved)
-            if self.abrupt:  # no step at all divides by zero
+            if self.abrupt:  # a step of size zero divides by zero
                 y = tuple(jnp.where(step > 0, a, b) for a, b in zip(y, moved, strict=True))
         if self.abrupt:
             clock = [t0 + step]
-        return y, (jnp.maximum(peak, jnp.asarray(system.excursion(y))), *clock)  # the maximum keeps a NaN
+        return y, (jnp.maximum(peak, jnp.asarray(system.excursion(y))), *clock)  # `maximum` propagates NaN
 
 
 def steps_through(
     solver: Any, steps: Any, pieces: Pieces, y: State, phase: Any, parts: Parts, tangents: Tangents
 ) -> tuple[State, Scalar, tuple[State, ...]]:
-    """One `parts`-th of a revolution of `steps` steps, and as many more as abrupt changes of the law ask for.
-
-    **Returns:** the state after it, the largest excursion on the way, the tangent vectors.
-    """
+    """Advance by one of `parts` equal parts of a revolution of `steps` steps, and more near abrupt changes of the law;
+    return the final state, the largest excursion and the tangent vectors."""
     field, system, scale = pieces
-    # How far out a state is, and in which units, has no derivative.
+    # Excursion and scale have no derivative.
     watching = jax.tree.map(lambda x: jax.lax.stop_gradient(x) if eqx.is_array(x) else x, (system, scale))
     structure, numbers = split((field, *watching), eqx.is_inexact_array)
     step = KernelStep(solver, structure, system.abrupt(scale, scale) is not None)
@@ -147,7 +139,7 @@ def steps_through(
     carry = go((tuple(y), step.watched(phase), tuple(t for t, _ in tangents)), count)
     if step.abrupt:
         more = jnp.maximum(count // MORE, 1)
-        # A lane that is lost ends the loop: it is far out, or its phase is NaN.
+        # A failed lane, with a large excursion or NaN, also ends the loop.
         through = lambda c: (c[1][1] < end) & (c[1][0] <= ESCAPE)
         carry = jax.lax.while_loop(through, lambda c: go(c, more), carry)
     y, (peak, *_), after = carry

@@ -17,15 +17,15 @@ PAIRS: dict[str, tuple[type[dfx.AbstractERK] | None, int]] = {
     "dopri8": (dfx.Dopri8, 8),
     "rodas4": (None, 4),
 }
-"""Embedded explicit pairs by name, with their order; and an implicit method."""
+"""Embedded explicit pairs and the implicit method (None) by name, with their order."""
 
 
 Layout = dict[str, range]
-"""Rows of a lane's numbers in the working memory of a vector, by name."""
+"""Rows of the working memory of a vector by name."""
 
 
 class Tableau(NamedTuple):
-    """Coefficients of an embedded pair whose last stage is the first of the next step."""
+    """Coefficients of an embedded pair with FSAL (first same as last)."""
 
     phase: list[float]
     stages: list[list[float]]
@@ -34,7 +34,7 @@ class Tableau(NamedTuple):
 
     @property
     def implicit(self) -> bool:
-        """True if a step is one program of its own (`Field.step`)."""
+        """True if a step is a program of its own (`Field.step`)."""
         return not self.error
 
     @classmethod
@@ -51,59 +51,57 @@ class Tableau(NamedTuple):
 
 
 class Field(NamedTuple):
-    """The programs of a system, traced, and what the loop is to do with their numbers."""
+    """The traced programs of a system for the integration loop, and options of the loop."""
 
     prelude: Any
-    """fixed numbers -> what the rates need of them."""
+    """Program: fixed numbers -> intermediate results of the rates that depend on nothing else."""
     rates: Any
-    """phase, state and tangents, fixed numbers, results of the prelude -> rates; or what writes the code of rates
-    itself (`Rollers`)."""
+    """Program: phase, state and tangents, fixed numbers, results of the prelude -> rates; or an object that writes the
+    code of the rates itself (`RollersCode`)."""
     excursion: Any | None
-    """phase, state, fixed numbers -> excursion; None where the code of rates stores what is watched behind the rates,
-    the excursion first."""
+    """Program: phase, state, fixed numbers -> excursion; None if the code of the rates stores the watched quantities,
+    the excursion first, after the rates."""
     abrupt: Any | None
-    """phase, state, rates, fixed numbers -> distance from an abrupt change of the law and speed towards it; None where
-    the law has none."""
+    """Program: phase, state, rates, fixed numbers -> distance from an abrupt change of the law and speed towards it;
+    None if the law has none."""
     dimension: int
     tangents: int
     wide: tuple[bool, ...]
-    """Which of the fixed numbers differ from lane to lane."""
+    """True for each fixed number that differs from lane to lane."""
     step: Any | None = None
-    """phase, length of the step, state and tangents, fixed numbers -> the same at its end, and their estimated errors;
-    for an implicit method."""
+    """Program of an implicit method: phase, step size, state and tangents, fixed numbers -> state and tangents at the
+    end, and their estimated errors."""
     beside: int = 0
-    """Numbers that are integrated beside the state, behind the tangents: their errors do not control the steps."""
+    """Number of additional integrands, stored after the tangents; their errors do not control the steps."""
     watched: int = 1
-    """Numbers whose largest values are kept; where there are more than the excursion, from one strobe to the next."""
+    """Number of quantities whose maximum is recorded; if more than the excursion, between strobe states."""
     phased: bool = False
-    """True if a lane's phase at a strobe follows from their number, and from the second fixed number."""
+    """True if a lane's phase at a strobe state follows from its index and the second fixed number."""
     own_turn: bool = False
     """True if the first fixed number is the phase from strobe to strobe, instead of a revolution."""
     relative: bool = True
-    """True if errors are measured relative to the state and to one, false for units of the scale alone."""
+    """True if errors are relative to the state plus one, False if in units of the scale."""
     careful: bool = True
-    """True if the errors of tangent vectors control the steps too."""
+    """True if the errors of tangent vectors also control the steps."""
 
     @property
     def moving(self) -> int:
-        """Numbers that are integrated."""
+        """Number of integrated numbers."""
         return self.dimension * (1 + self.tangents) + self.beside
 
     @property
     def span(self) -> int:
-        """Numbers that the code of rates stores."""
+        """Number of results stored by the code of the rates."""
         return self.moving + (0 if self.excursion is not None else self.watched)
 
     @property
     def recorded(self) -> int:
-        """Numbers of a strobe state: the state and, where there are any, what is integrated beside it and the largest
-        of what is watched."""
+        """Length of a strobe state: the state and, if any, additional integrands and maxima of watched quantities."""
         return self.dimension + (self.beside + self.watched if self.excursion is None else 0)
 
 
 def layout_of(field: Field, stages: int) -> Layout:
-    """Rows of the working memory: those that are stored when a lane leaves come first, then others that are loaded with
-    the next one, from `fixed` to `first_step`."""
+    """Rows of the working memory: up to `mark` stored when a lane ends, up to `first_step` loaded for the next one."""
     sizes = {
         "state": field.moving,
         "step": 1,
@@ -122,7 +120,7 @@ def layout_of(field: Field, stages: int) -> Layout:
 
 
 def fixed_numbers(w: Code, field: Field, rows: Layout, program: Any, first: int) -> list[Value]:
-    """The fixed numbers of a program, which stand behind its first arguments; those that it does not read are 0."""
+    """Fixed numbers of a program, its arguments from `first` on; those that it does not read are 0."""
     used = set(program.needed)
     values, wide_row, shared = [], iter(rows["fixed"]), itertools.count()
     for k, wide in zip(range(first, len(program.jaxpr.invars)), field.wide, strict=False):
@@ -132,6 +130,5 @@ def fixed_numbers(w: Code, field: Field, rows: Layout, program: Any, first: int)
 
 
 def rates_arguments(w: Code) -> str:
-    """Arguments of the function of rates."""
     phase, places = f"{w.type('double', True)} %phase", ("place", "memory", "shared", "out")
     return ", ".join([phase, *(f"ptr noalias %{name}" for name in places)])

@@ -1,11 +1,10 @@
-"""The integration loop: whole revolutions of many lanes by an embedded explicit pair, as LLVM IR.
+"""The integration loop: whole revolutions of many lanes by an embedded explicit pair or Rodas4, as LLVM IR.
 
-Each lane of a vector has a phase, a step size and a revolution of its own, and leaves the vector when it has finished
-or failed; the next lane of a queue, which all threads share, takes its place. Steps are controlled by the estimated
-error (PI controller), in units of the system's scale, and end near places where the law changes abruptly. At the end of
-a revolution the strobe state is stored, and tangent vectors are orthonormalised and their growth stored. What a lane
-does depends neither on its neighbours nor on the number of threads. The mark of a lane that leaves is the code of its
-outcome plus one.
+Each lane of a vector has its own phase, step size and revolution. When it has finished or failed, the next lane of a
+queue, which all threads share, replaces it. Steps are controlled by the estimated error (PI controller), in units of
+the system's scale, and end near abrupt changes of the law. At the end of a revolution the strobe state is stored,
+tangent vectors are orthonormalised, and their growth is stored. The results of a lane depend neither on other lanes nor
+on the number of threads. The mark of a lane that has ended is the code of its outcome plus one.
 """
 
 from typing import Any
@@ -20,12 +19,12 @@ from .step_control import limited_step, next_step, squared_error, step_to_strobe
 
 
 def march_ir(field: Field, pair: str, width: int) -> str:
-    """The module of a system: `march` runs lanes off a queue until it is empty.
+    """Module of a system, whose function `march` runs the lanes of a queue until it is empty.
 
     `march(queue, lanes, revolutions, keep, settings, shared, loaded, stored, strobe, growth)`: queue holds the next
-    lane and a flag that stops; settings are tolerance, largest step, smallest step, most steps of a revolution; loaded
-    and stored have a row of all lanes for each of the first rows of `layout_of`; strobe is (lanes, keep, recorded),
-    written in a ring; growth is (lanes, revolutions, tangents), squared lengths.
+    lane and a stop flag; settings are tolerance, largest step, smallest step, maximum number of steps per revolution;
+    loaded and stored have a row of all lanes for each of the first rows of `layout_of`; strobe is (lanes, keep,
+    recorded), a ring buffer; growth is (lanes, revolutions, tangents), squared lengths.
     """
     tableau = Tableau.named(pair)
     rows = layout_of(field, len(tableau.phase))
@@ -40,14 +39,14 @@ def march_ir(field: Field, pair: str, width: int) -> str:
 
 
 def _made_wide(field: Field) -> list[bool]:
-    """Which results of the prelude differ from lane to lane: those that follow from a number that does."""
+    """True for each result of the prelude that depends on a number that differs from lane to lane."""
     jaxpr = field.prelude.jaxpr
     wide = following(jaxpr.eqns, [v for v, each in zip(jaxpr.invars, field.wide, strict=True) if each])
     return [is_variable(v) and v in wide for v in jaxpr.outvars]
 
 
 def _prelude(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
-    """The code that works out everything that follows from the fixed numbers alone."""
+    """Code for everything that depends on the fixed numbers alone."""
     w = Code(width)
     results = w.program(field.prelude, fixed_numbers(w, field, rows, field.prelude, 0))
     for row, wide, v in zip(rows["made"], _made_wide(field), results, strict=True):
@@ -56,7 +55,7 @@ def _prelude(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
 
 
 def _rates(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
-    """Rates of state and tangents at `place`, stored at `out`."""
+    """Code for the rates of state and tangents at `place`, stored at `out`."""
     w = Code(width)
     moved = [w.get(j, base="%place") for j in range(field.moving)]
     arguments = [Value("%phase", "double", True), *moved]
@@ -69,7 +68,7 @@ def _rates(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
 
 
 def _implicit(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
-    """A step of an implicit method from the state in memory: where it leads to `stage`, its errors to `again`."""
+    """Code for an implicit step from the state in memory, with the new state in `stage` and its errors in `again`."""
     w = Code(width)
     assert field.step is not None
     moved = w.all(rows["state"])
@@ -153,11 +152,11 @@ return:
   ret i1 %alive_next
 }}
 """
-"""This function stores lanes that have left and loads lanes of the queue. Its result is true if any lane is left."""
+"""Function that stores lanes that have ended and loads lanes of the queue; true if any lane is left."""
 
 
 def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str, set[str]]:
-    """Steps of a vector of lanes, one after the other, with their control."""
+    """Code for the steps of a vector of lanes, with their control."""
     w = Code(width)
     n, moving, stages, span = field.dimension, field.moving, len(tableau.phase), field.span
     one, zero, marked = number(1.0), number(0.0), lambda code: number(code + 1.0)
@@ -166,7 +165,7 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     vector = w.type("double", True)
 
     def since_zero(phase: Value) -> Value:
-        """The phase of the law; that of the loop begins anew at each strobe."""
+        """Phase of the law; that of the loop restarts at each strobe state."""
         if not field.phased:
             return phase
         turn, k = w.get(row["fixed"]), w.add(w.get(row["fixed"] + 1), w.get(row["revolution"]))
@@ -312,13 +311,13 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
 
 
 def _orthonormalise(w: Code, field: Field, rows: Layout, over: Value, revolution: Value) -> None:
-    """Gram and Schmidt's method on the tangent vectors of lanes whose revolution is over; each vector is projected
-    twice, which keeps them orthogonal to rounding. Squared lengths go to `growth`."""
+    """Gram-Schmidt orthonormalisation of the tangent vectors where a revolution is over, with two projections to be
+    orthogonal to rounding; squared lengths go to `growth`."""
     n, first = field.dimension, rows["state"][0]
     place = w.convert("fptosi", w.mul(revolution, number(float(field.tangents))), "i64")
 
     def dot(a: int, b: int) -> Value:
-        """Scalar product of the vectors with these first rows."""
+        """Scalar product of the vectors that begin at these rows."""
         product = lambda at, sums: [w.add(sums[0], w.mul(w.get(at(a)), w.get(at(b))))]
         return w.over(n, [number(0.0)], product)[0]
 

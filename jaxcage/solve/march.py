@@ -1,12 +1,12 @@
-"""Many steps of one scalar function as a JAX primitive: plain code in, one loop of machine code over lanes out.
+"""Many steps of one scalar function as a JAX primitive, compiled to one loop of machine code over lanes.
 
-A step is written for a single lane, on scalars. What surrounds it decides what becomes of it:
-- `jax.vmap` makes lanes of it, and numbers that are the same in every lane stay scalars;
-- `jax.jvp` and `jax.jacfwd` put tangent vectors into the step, to any order; several directions share its values;
-- on a CPU it is machine code (`ir`) that JAX's program calls (`xla_call`): a few microseconds, and no compilation by
-  XLA; elsewhere, and for a step with an operation that has no translation, it is the same loop inside JAX.
+A step is written for a single lane, on scalars:
+- `jax.vmap` adds lanes; numbers common to all lanes remain scalars;
+- `jax.jvp` and `jax.jacfwd` add tangent vectors to the step, to any order; several directions share its values;
+- on a CPU JAX's program calls machine code (`ir`, `xla_call`), in a few microseconds and without compilation by XLA;
+  elsewhere, and for a step with an operation that has no translation, the loop runs inside JAX.
 
-Reverse mode is had by columns: a Jacobian matrix in forward mode, transposed (`orbits.newton.by_columns`).
+Reverse mode goes through columns: a Jacobian matrix in forward mode, transposed (`orbits.newton.by_columns`).
 """
 
 import dataclasses
@@ -29,13 +29,13 @@ from .xla_call import UnknownInterface, handler_ir, registered
 
 
 WIDTH = 8
-"""Lanes of a vector, at most."""
+"""Maximum number of lanes per vector."""
 DIRECTIONS = 8
-"""Directions that share the values of a step; more are lanes of their own."""
+"""Maximum number of directions that share the values of a step; more become separate lanes."""
 
 
 class How(NamedTuple):
-    """Arguments of the integration loop."""
+    """Static arguments of the integration loop."""
 
     step: Any
     sizes: Sizes
@@ -48,12 +48,11 @@ def march(
     watched: Sequence[Any] = (),
     fixed: Sequence[Any] = (),
 ) -> tuple[Numbers, Numbers]:
-    """`count` steps one after the other.
+    """Take `count` steps.
 
-    **Arguments:** the step; how many (an array: one program serves all counts); what is moved; what is watched; what
-    stays the same.
+    **Arguments:** step; number of steps (an array, so that one program serves all); moved, watched and fixed numbers.
 
-    **Returns:** what was moved and what was watched.
+    **Returns:** final moved and watched numbers.
     """
     sizes = Sizes(len(moved), len(watched), len(fixed))
     if not is_elementary(step, sizes, fixed):
@@ -72,12 +71,12 @@ def march_with_tangents(
     tangents: Sequence[Sequence[Any]],
     fixed_tangents: Sequence[Sequence[Any]] = (),
 ) -> tuple[Numbers, Numbers, tuple[Numbers, ...]]:
-    """`march`, and what it does to tangent vectors.
+    """Take `count` steps and transport tangent vectors.
 
-    **Arguments:** as for `march`; tangent vectors of what is moved; for each of them those of the fixed numbers, None
-    where there is none, by default none at all.
+    **Arguments:** as for `march`; tangent vectors of the moved numbers; for each of them those of the fixed numbers,
+    None for zero (the default).
 
-    **Returns:** what was moved, what was watched, the tangent vectors of what was moved.
+    **Returns:** final moved and watched numbers, and tangent vectors of the moved numbers.
     """
     if not tangents:
         return *march(step, count, moved, watched, fixed), ()
@@ -98,10 +97,8 @@ def march_with_tangents(
 
 
 def with_tangents(move: Callable[[Any], Any], start: Any, tangents: Sequence[Any]) -> tuple[Any, tuple[Any, ...], Any]:
-    """`move(start)`, which is where that leads and what is seen on the way, differentiated along each of the tangents.
-
-    **Returns:** where it leads, the tangents there, what is seen.
-    """
+    """Evaluate `move(start)`, a pair (result, auxiliary values), and differentiate it along each tangent; return the
+    result, its tangents, and the auxiliary values."""
     if not tangents:
         end, seen = move(start)
         return end, (), seen
@@ -120,16 +117,16 @@ def _rows(numbers: Sequence[Any], size: int) -> Iterator[Numbers]:
 
 @dataclasses.dataclass(frozen=True)
 class Tangent:
-    """A step with tangent vectors: moved (y, T_1, T_2, ...), fixed (x, the known tangents of x in each direction)."""
+    """A step with tangent vectors: moved (y, T_1, T_2, ...), fixed (x, the nonzero tangents of x in each direction)."""
 
     step: Step
     sizes: Sizes
     known: tuple[tuple[bool, ...], ...]
-    """For each direction, which of the fixed numbers have a tangent."""
+    """True, in each direction, for every fixed number that has a tangent."""
 
     @property
     def whole(self) -> Sizes:
-        """Sizes with the tangents counted in."""
+        """Sizes including the tangents."""
         moved, watched, fixed = self.sizes
         return Sizes(moved * (1 + len(self.known)), watched, fixed + sum(map(sum, self.known)))
 
@@ -140,7 +137,7 @@ class Tangent:
 
         @functools.cache
         def linear(known: tuple[bool, ...]) -> Any:
-            """Value, linear map and what is watched, with derivatives by y and the known ones of x."""
+            """Value, linear map by y and the known x, and watched numbers."""
 
             def go(y: Numbers, some: Numbers) -> tuple[Numbers, Numbers]:
                 given = iter(some)
@@ -158,7 +155,7 @@ class Tangent:
 
 @dataclasses.dataclass(frozen=True)
 class Limited:
-    """A step of lanes that stop after their own counts, the first fixed number."""
+    """A step for lanes that stop after individual counts, the first fixed number."""
 
     step: Step
 
@@ -170,7 +167,7 @@ class Limited:
 
 
 def _limited(step: Any) -> Any:
-    """The step that stops after a count of its own, tangents outside."""
+    """Step that stops after an individual count, with tangents outermost."""
     if not isinstance(step, Tangent):
         return Limited(step)
     known = tuple((False, *row) for row in step.known)
@@ -182,12 +179,12 @@ def _one_more(sizes: Sizes) -> Sizes:
 
 
 def _share(tangent: Tangent) -> bool:
-    """True if all directions of a step are computed together; a program of higher derivatives has one."""
+    """True if all directions of a step are computed together, which is not done for higher derivatives."""
     return not isinstance(tangent.step, Tangent) and len(tangent.known) <= DIRECTIONS
 
 
 def is_elementary(step: Step, sizes: Sizes, fixed: Sequence[Any]) -> bool:
-    """True if `step` is made of elementary operations on scalars alone."""
+    """True if `step` consists of elementary operations on scalars."""
     if any(jnp.ndim(x) for x in fixed):
         return False
     if isinstance(step, Tangent):
@@ -202,7 +199,6 @@ def is_elementary(step: Step, sizes: Sizes, fixed: Sequence[Any]) -> bool:
 
 
 def _plain(step: Step, count: Any, moved: Numbers, watched: Numbers, fixed: Numbers) -> tuple[Numbers, Numbers]:
-    """The loop inside JAX."""
 
     def body(i: Array, carry: tuple[Numbers, Numbers]) -> tuple[Numbers, Numbers]:
         moved, watched = step(i.astype(float), *carry, fixed)
@@ -212,7 +208,7 @@ def _plain(step: Step, count: Any, moved: Numbers, watched: Numbers, fixed: Numb
 
 
 def _inside_jax(count: Array, *numbers: Array, how: How) -> list[Array]:
-    """The march where there is no machine code; numbers that all lanes share are scalars."""
+    """Loop in JAX without machine code; numbers common to all lanes are scalars."""
 
     def lane(*numbers: Array) -> list[Array]:
         out = _plain(how.step, count, *how.sizes.split(numbers))
@@ -224,7 +220,7 @@ def _inside_jax(count: Array, *numbers: Array, how: How) -> list[Array]:
 
 
 def _on_cpu(count: Array, *numbers: Array, how: How) -> list[Array]:
-    """The march as a call of machine code: a loop over vectors of lanes around one over steps."""
+    """Call of machine code: a loop over vectors of lanes around one over steps."""
     shape = max((x.shape for x in numbers), key=len)
     lanes, moving = math.prod(shape), how.sizes.moved + how.sizes.watched
     wide = tuple(bool(x.shape) for x in numbers[moving:])
@@ -241,8 +237,8 @@ def _on_cpu(count: Array, *numbers: Array, how: How) -> list[Array]:
 
 @functools.lru_cache(maxsize=256)
 def code_of(step: Any, sizes: Sizes, wide: tuple[bool, ...], width: int) -> tuple[str, tuple[int, ...]] | None:
-    """The name by which XLA knows the machine code of a step, and which of the fixed numbers it reads; None where there
-    is no such code, which a warning says."""
+    """XLA's name for the machine code of a step, and the indices of the fixed numbers it reads; None, after a warning,
+    if the step cannot be translated."""
     moving = sizes.moved + sizes.watched
     program = program_of(step, sizes)
     read = tuple(i - 1 - moving for i in program.needed if i > moving)
@@ -258,11 +254,11 @@ def code_of(step: Any, sizes: Sizes, wide: tuple[bool, ...], width: int) -> tupl
 
 
 def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: int) -> str:
-    """`march(inputs, outputs)`: the loop over steps of a program (number of the step, numbers) -> the first `moving`.
+    """Code of `march(inputs, outputs)`: the loop over steps of a program (step number, numbers) -> the first `moving`.
 
-    Inputs are a pair of counts, of steps and of lanes; the numbers that move; and the others that
-    are `read`, each with its place behind those and whether lanes have one each. There are `width`
-    lanes at least: the last vector of them overlaps the one before it.
+    Inputs are the counts of steps and of lanes, the moving numbers, and those that are `read`, given by their indices
+    after these, with True if they differ from lane to lane. There must be at least `width` lanes: the last vector
+    overlaps the one before it.
     """
     w = Code(width)
     pointer = lambda base, k: w.let(
@@ -348,7 +344,7 @@ def _batch(args: Sequence[Any], dims: Sequence[Any], *, how: How) -> Any:
     size = next(x.shape[d] for x, d, m in zip(args, dims, mapped, strict=True) if m)
     args = [jnp.moveaxis(x, d, 0) if m else x for x, d, m in zip(args, dims, mapped, strict=True)]
     results = how.sizes.moved + how.sizes.watched
-    if mapped[0]:  # lanes with counts of their own
+    if mapped[0]:  # lanes with individual counts
         count, *numbers = args
         args = [jnp.max(count), *numbers[:results], count.astype(float), *numbers[results:]]
         mapped = [False, *mapped[1 : 1 + results], True, *mapped[1 + results :]]
@@ -362,7 +358,7 @@ def _batch(args: Sequence[Any], dims: Sequence[Any], *, how: How) -> Any:
 
 
 def _lanes(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How) -> Any:
-    """The march of lanes of one shape, the new axis first; numbers that all lanes share stay scalars."""
+    """Batch all numbers, with the new axis first; numbers common to all lanes remain scalars."""
     count, *numbers = args
     shape = max((x.shape[m:] for x, m in zip(numbers, mapped[1:], strict=True)), key=len)
 
@@ -376,7 +372,7 @@ def _lanes(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How) -> 
 
 
 def _directions(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How) -> Any:
-    """Tangents alone are mapped: values are computed once, and stay as they are."""
+    """Batch the tangents alone, so that values are computed once."""
     count, *numbers = args
     step, sizes = how.step, how.sizes
     inner, old = step.sizes, len(step.known)
@@ -386,7 +382,7 @@ def _directions(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How
     several = dataclasses.replace(step, known=step.known * size)
     if not _share(several):
         out = _lanes(args, mapped, size, how)
-        once = lambda row: [x[0] for x in row]  # values are the same in every lane
+        once = lambda row: [x[0] for x in row]  # values are equal in all lanes
         out = [*once(out[: inner.moved]), *out[inner.moved : sizes.moved], *once(out[sizes.moved :])]
     else:
         slices = lambda k, row, flags: [v[k] if m else v for v, m in zip(row, flags, strict=True)]

@@ -1,4 +1,4 @@
-"""Methods: a diffrax solver together with how it chooses its steps, and the advance through a part of a revolution."""
+"""Integration methods: a solver together with its choice of steps, and the advance by a part of a revolution."""
 
 import abc
 import math
@@ -21,27 +21,27 @@ from .solvers import ClassicalRK4, Rodas4
 
 
 FIRST_STEPS, MOST_STEPS = 64, 100_000
-"""The first of adaptive steps is a revolution over so many; and the most of them."""
+"""Number of first steps that would make a revolution, and maximum number of steps, with adaptive steps."""
 SHARPER = 1e-2
-"""Tolerance of the run that measures errors, as a fraction of the tolerance."""
+"""Tolerance of the reference run that measures errors, as a fraction of the method's."""
 DEFAULT_TOLERANCE = 1e-6
 DEFAULT_ERROR = 3e-3
 """Largest error of a revolution, in units of the system's scale (for a cage: clearances)."""
 DEFAULT_PAIR = "tsit5"
 IMPLICIT = "rodas4"
-"""Method of lanes that take too many or too short steps by an explicit one."""
+"""Method for lanes that take too many or too short steps with an explicit one."""
 FINER = 16.0
-"""Factor between the tolerances of a run and of the one that confirms it."""
+"""Factor by which `finer` divides tolerances."""
 
 
 class Stretch(NamedTuple):
-    """A lane after a part of a revolution; or many, their axis last."""
+    """Result of the advance of a lane, or of many with their axis last, by a part of a revolution."""
 
     y: State
     peak: Scalar
-    """Largest excursion on the way."""
+    """Largest excursion."""
     outcome: Int[Array, "*lanes"]
-    """Place in `OUTCOMES`."""
+    """Index into `OUTCOMES`."""
     tangents: tuple[State, ...]
 
 
@@ -50,48 +50,48 @@ def _evaluate(tau: Any, y: Any, field: Any) -> State:
 
 
 TERM = dfx.ODETerm(_evaluate)
-"""The diffrax term of every field: the field itself travels as `args`, where solvers can use its structure."""
+"""Diffrax term of every field; the field itself is passed as `args`, where solvers can use its structure."""
 
 
 class AbstractMethod(eqx.Module):
-    """How to integrate a field over a part of a revolution."""
+    """Abstract method for integrating a field over a part of a revolution."""
 
     @property
     def allowed(self) -> float:
-        """Largest measured error of a revolution that is accepted, in units of the scale."""
+        """Largest accepted measured error of a revolution, in units of the scale."""
         return math.inf
 
     @property
     def in_jax(self) -> "AbstractMethod":
-        """The method that stands for this one inside JAX's programs."""
+        """Method that replaces this one inside JAX's programs."""
         return self
 
     @property
     @abc.abstractmethod
     def reference(self) -> "AbstractMethod":
-        """The method beside which the error of this one is measured."""
+        """More accurate method by which the error of this one is measured."""
 
     @abc.abstractmethod
     def finer(self, times: int = 1) -> "AbstractMethod":
-        """The same with steps half as long, or tolerances `FINER` times smaller, `times` over, to confirm it by."""
+        """Method with steps halved, or tolerances divided by `FINER`, `times` times."""
 
     @abc.abstractmethod
     def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Parts, tangents: Tangents = ()) -> Stretch:
-        """Go one `parts`-th of a revolution from state `y` at `phase`, with tangent vectors."""
+        """Advance state `y` at `phase`, and tangent vectors, by one of `parts` equal parts of a revolution."""
 
 
 def _outcome_at(y: State, excursion: Scalar) -> Int[Array, ""]:
-    """The outcome of an integration that came to a state."""
+    """Outcome code of an integration that reached a state."""
     finite = jnp.isfinite(sum(jnp.sum(jnp.abs(c)) for c in y))
     return jnp.where(finite, jnp.where(excursion <= ESCAPE, FINISHED, OUTSIDE), NOT_FINITE)
 
 
 class FixedSteps(AbstractMethod):
-    """The same number of equal steps in every revolution: the strobe map is as smooth as the field."""
+    """Method with equal steps, shortened near abrupt changes of the law; the strobe map is as smooth as the field."""
 
     solver: dfx.AbstractSolver
     steps: int | Int[Array, "*levels"]
-    """An array where one program is to serve all numbers of steps."""
+    """Number of steps per revolution, an array if one program is to serve all numbers."""
 
     def __check_init__(self):
         if not can_be_kernel(self.solver):
@@ -115,13 +115,12 @@ class FixedSteps(AbstractMethod):
 
 
 class AdaptiveSteps(AbstractMethod):
-    """Steps chosen by an error estimate relative to the state and to the system's own scale, as diffrax makes them.
-
-    The largest excursion is that of the ends of revolutions, or of their parts."""
+    """Method with steps chosen by diffrax from an error estimate relative to the state and to the system's scale; the
+    excursion is only evaluated at the ends of revolutions, or of their parts."""
 
     solver: dfx.AbstractAdaptiveSolver
     tolerance: float = eqx.field(static=True)
-    """Of the error estimate, relative to the state and to the system's scale; and a lower bound of a measured error."""
+    """Tolerance relative to the state and to the system's scale; also the lower bound of a measured error."""
 
     @property
     def reference(self) -> "AdaptiveSteps":
@@ -168,10 +167,8 @@ class AdaptiveSteps(AbstractMethod):
 
 
 class NativeSteps(AbstractMethod):
-    """Whole revolutions in machine code, by an embedded explicit pair with a step size of its own for each lane.
-
-    Within JAX's programs, and for a law that cannot be translated, Tsitouras' method in diffrax stands for it.
-    """
+    """Method in machine code: an embedded explicit pair, or Rodas4, with an individual step size for each lane; within
+    JAX's programs, and for a law that cannot be translated, `in_jax` replaces it."""
 
     tolerance: float = eqx.field(static=True)
     """Largest estimated error of a step, relative to the state and to the system's scale."""
@@ -193,7 +190,7 @@ class NativeSteps(AbstractMethod):
 
     @property
     def implicit(self) -> "NativeSteps":
-        """The same by the implicit method, for stiff laws."""
+        """Implicit method with these tolerances, for stiff laws."""
         return NativeSteps(self.tolerance, self.error, IMPLICIT)
 
     def advance(self, *args: Any, **kwargs: Any) -> Stretch:
@@ -223,7 +220,7 @@ DEFAULT_STEPS = 1024
 
 
 def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: float | None = None) -> AbstractMethod:
-    """An integration method by name.
+    """Integration method by name, with fixed or adaptive steps.
 
     **Arguments:**
 
@@ -257,12 +254,12 @@ def _require_tolerance(tolerance: float) -> None:
 def native(
     tolerance: float = DEFAULT_TOLERANCE, error: float = DEFAULT_ERROR, pair: str = DEFAULT_PAIR
 ) -> AbstractMethod:
-    """Machine code, compiled from the traced law.
+    """Integration method in machine code, compiled from the traced law.
 
     **Arguments:** largest estimated error of a step, relative to the state and to the system's scale; largest measured
-    error of a revolution in units of the scale, beyond which a lane is run again with smaller tolerances; method, an
-    embedded explicit pair (`tsit5`, `dopri5`, `bosh3`, `dopri8`) or the L-stable `rodas4`, which lanes take by
-    themselves that an explicit one serves badly.
+    error of a revolution in units of the scale, beyond which a lane is run again with smaller tolerances; embedded
+    explicit pair (`tsit5`, `dopri5`, `bosh3`, `dopri8`), or the L-stable `rodas4`, to which lanes that need too many or
+    too short explicit steps are switched automatically.
 
     **Raises:** `ValueError` for numbers that are not positive, and an unknown pair.
     """

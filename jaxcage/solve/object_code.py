@@ -1,7 +1,7 @@
-"""Object code of LLVM IR, compiled with llvmlite, kept on disk and loaded.
+"""Object code of LLVM IR, compiled with llvmlite, stored on disk and loaded.
 
-It is kept in the user's cache folder, under a key made of the IR, the processor and the version of LLVM; an entry that
-is damaged is compiled again.
+It is stored in the user's cache folder, under a key made of the IR, the processor and the version of LLVM; damaged
+entries are compiled again.
 """
 
 import functools
@@ -29,7 +29,6 @@ def _machine() -> Any:
 
 
 def _compiled(ir: str) -> bytes:
-    """Object code of a module."""
     module = llvm.parse_assembly(ir)
     module.verify()
     tuning = llvm.create_pipeline_tuning_options(speed_level=2)
@@ -40,7 +39,7 @@ def _compiled(ir: str) -> bytes:
 
 
 def cache_folder() -> pathlib.Path | None:
-    """The folder of object code; None with `JAXCAGE_CACHE=off`, and for a folder that others may write to."""
+    """Folder of object code; None with `JAXCAGE_CACHE=off`, and for a folder that others may write to."""
     given = os.environ.get("JAXCAGE_CACHE", "")
     if given == "off":
         return None
@@ -52,7 +51,7 @@ def cache_folder() -> pathlib.Path | None:
 
 
 def object_code(ir: str) -> bytes:
-    """Object code of a module for this processor, from the cache if it is there and whole."""
+    """Object code of a module for this processor, from the cache if it has an undamaged entry."""
     processor = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()} {_machine().triple}"
     about = f"{ir} {llvm.llvm_version_info} {processor}"
     folder = cache_folder()
@@ -72,13 +71,13 @@ def object_code(ir: str) -> bytes:
             new.write_bytes(digest(code) + code)
             new.replace(path)
         except OSError:
-            pass  # a folder that cannot be written costs time, no result
+            pass  # without a writable folder the code is compiled again next time
     return code
 
 
 @functools.cache
 def _linker() -> Any:
-    # LLVM's older linker may put parts of a module more than 2 GB apart, which ends the process.
+    # LLVM's older linker may place parts of a module more than 2 GB apart, which crashes the process.
     return orcjit.create_lljit_compiler(_machine(), use_jit_link=True)
 
 
@@ -87,11 +86,10 @@ _linking = threading.Lock()
 
 
 def function(ir: str, name: str) -> int:
-    """Address of a function of a module. Code is never freed: a program whose code is freed while it runs ends the
-    process."""
+    """Address of a function of a module; code is never freed, since that would crash programs that still use it."""
     if (ir, name) not in _libraries:
         code = object_code(ir)
-        with _linking:  # threads may ask for the same module, and the linker takes each name once
+        with _linking:  # several threads may request the same module, but the linker accepts each name only once
             if (ir, name) not in _libraries:
                 builder = orcjit.JITLibraryBuilder().add_object_img(code).add_current_process()
                 named = name + hashlib.sha256(ir.encode()).hexdigest()[:24]

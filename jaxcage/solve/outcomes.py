@@ -1,4 +1,4 @@
-"""Results of an integration, and how it ended."""
+"""Results and outcomes of an integration."""
 
 from typing import NamedTuple
 
@@ -16,10 +16,10 @@ OUTCOMES = (
     "other",
     "inaccurate",
 )
-"""Names of outcomes in the order of the integer codes that sweeps store: all revolutions done; the state became
-infinite or undefined; the state started outside, or went far outside, what the model holds for; too many steps in a
-revolution; an iteration that did not converge; the error cannot be met by the smallest step; another failure of
-diffrax; a revolution whose measured error is larger than allowed, on the finest steps."""
+"""Names of outcomes in the order of their integer codes: all revolutions done; the state became infinite or undefined;
+the state was initially outside, or went far outside, the range of the model; too many steps in a revolution; an
+iteration did not converge; the tolerance cannot be met with the smallest step; another failure of diffrax; the measured
+error of a revolution is larger than allowed even with the smallest steps."""
 FINISHED, NOT_FINITE, OUTSIDE, TOO_MANY, DIVERGED, STUCK, OTHER, INACCURATE = range(len(OUTCOMES))
 
 
@@ -27,23 +27,23 @@ class March(NamedTuple):
     """Results of a run of lanes."""
 
     state: Float[np.ndarray, "lanes numbers"]
-    """State at the end in units of the scale, and behind it the values of what is integrated beside it."""
+    """Final state in units of the scale, followed by the values of additional integrands."""
     tangents: Float[np.ndarray, "lanes tangents dim"]
     step: Float[np.ndarray, " lanes"]
-    """Step size to go on with [rad]."""
+    """Size of the next step [rad]."""
     peaks: Float[np.ndarray, "lanes parts watched"]
-    """Largest values of what is watched: between the strobe states that are kept or, if it is the excursion alone, of
-    the whole run (parts = 1)."""
+    """Maxima of the watched quantities between the strobe states kept or, for the excursion alone, over the whole run
+    (parts = 1)."""
     steps: Float[np.ndarray, " lanes"]
     """Number of steps tried."""
     outcome: Int[np.ndarray, " lanes"]
-    """Code of how each lane ended, its place in `OUTCOMES`; -1 if it was not run."""
+    """Index into `OUTCOMES` of how each lane ended; -1 if it was not run."""
     strobe: Float[np.ndarray, "lanes keep numbers"]
-    """The last strobe states, the latest last, as `state` is."""
+    """Last strobe states in the form of `state`, the latest last."""
     growth: Float[np.ndarray, "lanes revolutions tangents"]
     """Logarithm of the growth of each tangent vector in each revolution."""
 
     @property
     def peak(self) -> Float[np.ndarray, " lanes"]:
-        """Largest value of the first quantity that is watched: the excursion."""
+        """Largest value of the first watched quantity, the excursion."""
         return np.fmax.reduce(self.peaks[..., 0], axis=1)

@@ -1,4 +1,4 @@
-"""Scalar functions traced once: what a step computes, written out as elementary operations."""
+"""Traced scalar functions: a step as a sequence of elementary operations."""
 
 import functools
 from collections.abc import Callable, Sequence
@@ -13,43 +13,42 @@ from jax.core import Tracer, eval_jaxpr
 
 Numbers = tuple[Any, ...]
 Step = Callable[[Any, Numbers, Numbers, Numbers], tuple[Sequence[Any], Sequence[Any]]]
-"""(number of the step, what it moves, what it watches, what is fixed) -> (moved, watched), all scalars.
+"""Function (step number, moved, watched, fixed) -> (moved, watched) of scalars.
 
-What is watched (a maximum, an error estimate) has no derivative. A step that equals an earlier one, as a dataclass of
-the same fields does, is not traced again."""
+Watched numbers (a maximum, an error estimate) have no derivative. A step that equals an earlier one, such as a
+dataclass with equal fields, is not traced again."""
 
 CONTROL_FLOW = {"while", "scan", "cond"}
 STAYS_CALL = "evaluated_often"
-"""Name of a function under `jax.jit` that a program calls several times: it is differentiated once for all of them."""
+"""Name of a function under `jax.jit` that a program calls several times, and that is differentiated only once."""
 
 _variables = lambda atoms: {v for v in atoms if not isinstance(v, jex.core.Literal)}
 _read = lambda equation: _variables(equation.invars)
 _identity = lambda x: id(x) if isinstance(x, Tracer) else (np.asarray(x).dtype.str, np.asarray(x).tobytes())
-"""Key of a number: equal keys mean the same number."""
+"""Key that is equal for equal numbers."""
 
 
 class Sizes(NamedTuple):
-    """How many numbers of each kind a step has."""
+    """Counts of the moved, watched and fixed numbers of a step."""
 
     moved: int
     watched: int
     fixed: int
 
     def split(self, numbers: Sequence[Any]) -> tuple[Numbers, Numbers, Numbers]:
-        """Moved, watched, fixed."""
         a, b = self.moved, self.moved + self.watched
         return tuple(numbers[:a]), tuple(numbers[a:b]), tuple(numbers[b:])
 
 
 class Program(NamedTuple):
-    """A scalar function traced."""
+    """A traced scalar function."""
 
     jaxpr: Any
     consts: Any
 
     @property
     def needed(self) -> list[int]:
-        """Which of its arguments it uses."""
+        """Indices of the arguments that are used."""
         read = _variables(self.jaxpr.outvars).union(*map(_read, self.jaxpr.eqns))
         return [i for i, v in enumerate(self.jaxpr.invars) if v in read]
 
@@ -63,7 +62,7 @@ def _arguments(sizes: Sizes) -> list[Any]:
 
 @functools.lru_cache(maxsize=128)
 def _traced(step: Step, sizes: Sizes) -> Any:
-    """The step as a function (number, moved, watched, fixed) -> (moved, watched) of scalars in a row."""
+    """Trace a step as a function of one row of scalars."""
 
     def flat(i: Any, *x: Any) -> tuple[Any, ...]:
         moved, watched = step(i, *sizes.split(x))
@@ -74,9 +73,8 @@ def _traced(step: Step, sizes: Sizes) -> Any:
 
 @functools.lru_cache(maxsize=128)
 def program_of(step: Step, sizes: Sizes, rules: bool = False) -> Program:
-    """The program of a step; with `rules`, functions that have a derivative of their own, and those that are evaluated
-    often, stay calls: to be differentiated, for which a program is traced much faster than the code that it came from.
-    """
+    """Program of a step; with `rules`, functions with a custom derivative and those that are evaluated often remain
+    calls, so that the program can be differentiated, which is much faster than tracing the original code again."""
     traced = _traced(step, sizes)
     once = functools.partial(_inlined, traced.jaxpr, traced.consts, seen={}, rules=rules)
     traced = jax.make_jaxpr(once)(*_arguments(sizes))
@@ -85,7 +83,7 @@ def program_of(step: Step, sizes: Sizes, rules: bool = False) -> Program:
 
 
 def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any], rules: bool) -> list[Any]:
-    """The function with the functions that it calls written out, and what it computes twice computed once."""
+    """Inline the functions that a function calls, and eliminate common subexpressions."""
     known = dict(zip([*jaxpr.constvars, *jaxpr.invars], [*consts, *args], strict=True))
     read = lambda v: v.val if isinstance(v, jex.core.Literal) else known[v]
     for e in jaxpr.eqns:
@@ -107,7 +105,7 @@ def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any]
 
 
 def following(equations: Sequence[Any], given: Sequence[Any]) -> set[Any]:
-    """The variables given, and those that follow from any of them."""
+    """The given variables and all that depend on any of them."""
     found = set(given)
     for e in equations:
         if found & _variables(e.invars):
@@ -116,7 +114,7 @@ def following(equations: Sequence[Any], given: Sequence[Any]) -> set[Any]:
 
 
 def needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
-    """Those of the equations that what is wanted follows from, in their order."""
+    """Equations on which the wanted variables depend, in their order."""
     reached = _variables(wanted)
     kept = []
     for e in reversed(equations):

@@ -29,26 +29,24 @@ from .outcomes import INACCURATE, OUTCOMES, OUTSIDE, STUCK, TOO_MANY
 
 
 TOLERANCE = 1e-8
-"""Tolerance of time histories by default: an error in one sample grows from there to the next."""
+"""Default tolerance of time histories, small because errors grow from sample to sample."""
 BEARING_TOLERANCE, BEARING_ERROR = 1e-5, 1e-2
-"""The same for a whole bearing, and the largest measured error of a stretch that can be compared."""
+"""Default tolerance for a whole bearing, and largest measured error of a comparable stretch."""
 MOST_PARTS = 1000
-"""Most parts from sample to sample in which errors are measured."""
+"""Maximum number of parts between two samples for measuring errors."""
 Start = State | BearingState | Float[Array, " dim"] | Float[np.ndarray, " dim"]
-"""An initial state [SI]: a tuple of numbers; of a whole bearing a row of them, or by name."""
+"""Initial state [SI]: a tuple of numbers; for a whole bearing an array or a `BearingState`."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Trajectory:
-    """States at equally spaced phases, or at given times.
-
-    A model with quantities beside its state has a sample at the end of the last revolution too.
-    """
+    """Time history: states at equally spaced phases, or at given times; with additional integrands also at the end of
+    the last revolution."""
 
     time: Float[np.ndarray, " n"]
-    """Time from the first sample [s]."""
+    """Time from the first sample, for a whole bearing from the beginning of the run [s]."""
     tau: Float[np.ndarray, " n"]
-    """Phase [rad], 0 at the beginning of the run (before any discarded revolutions); a whole bearing: cage angle."""
+    """Phase from the beginning of the run, before any discarded revolutions; for a whole bearing cage angle [rad]."""
     state: Float[np.ndarray, "n dim"]
     """State in SI units; NaN from the sample after a failure."""
     speed: Float[np.ndarray, " n"]
@@ -56,56 +54,56 @@ class Trajectory:
     samples: int
     """Samples per revolution."""
     peak: float
-    """Largest excursion of the first sample and at any step after it, between the samples too; for a cage eps."""
+    """Largest excursion from the first sample on, also between samples; for a cage the eccentricity ratio."""
     outcome: str
-    """`successful`, or the name of what went wrong."""
+    """Outcome: `successful`, or the name of a failure."""
     error: float = math.nan
-    """Largest error of a stretch that can be compared with a more exact run (a cage: a revolution), in units of the
-    model's scale (a cage: clearances): the sum of the changes of the ends of its parts. NaN for a trajectory that no
-    integration has made."""
+    """Largest error of a stretch that can be compared with a more accurate run (a revolution for a cage), in units of
+    the model's scale (clearances for a cage): the sum of the errors of its parts. NaN for a trajectory that was not
+    integrated."""
     beside: tuple[str, ...] = ()
-    """Names of the quantities that are integrated beside the state."""
+    """Names of the additional integrands."""
     integrals: Float[np.ndarray, "points beside"] = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
-    """Their values from the beginning [SI]."""
+    """Integrals from the beginning of the run, at each sample [SI]."""
     watched: tuple[str, ...] = ()
-    """Names of the quantities whose largest values are recorded."""
+    """Names of the quantities whose maximum is recorded."""
     peaks: Float[np.ndarray, "parts watched"] = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
-    """Largest values between two samples."""
+    """Maxima of the watched quantities between two samples."""
     steps: float = math.nan
-    """Mean number of steps of a revolution."""
+    """Mean number of steps per revolution."""
 
     @property
     def rpm(self) -> Float[np.ndarray, " n"]:
-        """Speed in revolutions per minute."""
+        """Speed at each sample [rpm]."""
         return self.speed * 30 / np.pi
 
     @property
     def angle(self) -> Float[np.ndarray, " n"]:
-        """Angle of the cage of a whole bearing [rad]."""
+        """Rotation angle of the cage of a whole bearing [rad]."""
         return self.integrals[:, self.beside.index("angle")]
 
     @property
     def rollers(self) -> Float[np.ndarray, "n 5 rollers"]:
-        """Rollers of a whole bearing: lag, spin, radius and its rate, orbital speed, as in `models.Rollers` [SI]."""
+        """Roller states of a whole bearing: lag, spin, radius and its rate, orbital speed (`models.Rollers`) [SI]."""
         return rollers_of(self.state)
 
     @property
     def bodies(self) -> Float[np.ndarray, "n 9"]:
-        """Cage and inner ring of a whole bearing, as in `models.Bodies` [SI]."""
+        """States of the cage and inner ring of a whole bearing (`models.Bodies`) [SI]."""
         return bodies_of(self.state)
 
     @property
     def last(self) -> BearingState:
-        """The last state of a whole bearing."""
+        """Last state of a whole bearing."""
         return BearingState(*map(jnp.asarray, (self.rollers[-1], self.bodies[-1], self.integrals[-1, :2])))
 
     def total(self, name: str) -> float:
-        """The integral of a quantity over the whole trajectory, by its name in `beside`."""
+        """Integral of a quantity over the whole trajectory, by its name in `beside`."""
         i = self.beside.index(name)
         return float(self.integrals[-1, i] - self.integrals[0, i])
 
     def largest(self, name: str) -> float:
-        """The largest value of a quantity, by its name in `watched`."""
+        """Largest value of a quantity, by its name in `watched`."""
         return float(np.max(self.peaks[:, self.watched.index(name)]))
 
     def __str__(self) -> str:
@@ -119,7 +117,7 @@ class Trajectory:
 
 
 def _start(system: AbstractForcedSystem, speed: float, start: Start | None) -> np.ndarray:
-    """The first state, with the quantities beside it behind."""
+    """Initial state, followed by the additional integrands."""
     dim = system.dimension
     y0, beside = system.first_state(system.initial_states(jnp.asarray(speed))[0] if start is None else start)
     if y0.shape != (dim,):
@@ -130,23 +128,21 @@ def _start(system: AbstractForcedSystem, speed: float, start: Start | None) -> n
 
 
 class _Ran(NamedTuple):
-    """Strobe states by one method."""
+    """Results of a run with one method."""
 
     states: Float[np.ndarray, "1+parts numbers"]
-    """[SI]; NaN after a failure."""
+    """States [SI]; NaN after a failure."""
     peaks: Float[np.ndarray, "parts watched"]
-    """Largest values in each part; of a model that records the excursion alone, at the first of those run at once."""
+    """Maxima in each part; for a model that records the excursion alone, at the first of the parts run at once."""
     errors: Float[np.ndarray, " stretches"]
     code: int
     steps: float
-    """Steps tried."""
+    """Number of steps tried."""
 
 
 def _run(lanes: Lanes, samples: int, stretch: int, start: np.ndarray, method: AbstractMethod) -> _Ran:
-    """Parts of a run one after the other, each a lane of its own at its own speed.
-
-    **Arguments:** lanes; parts of a revolution; parts over which an error is stated; first state; method.
-    """
+    """Run parts one after the other, each a lane at its own speed: `samples` per revolution, and one error for every
+    `stretch` of them."""
     n, speed, dim = lanes.speed.size, lanes.speed, lanes.system.dimension
     every, begin = np.arange(n), np.arange(n) % samples
     engine = lanes.engine(0, method, samples)
@@ -155,7 +151,7 @@ def _run(lanes: Lanes, samples: int, stretch: int, start: np.ndarray, method: Ab
     y, peaks = np.full((n + 1, start.size), np.nan), np.full((n, len(lanes.system.watched)), np.nan)
     y[0], code = start, 0 if excursion <= 1 or lanes.system.beside else OUTSIDE
     step, done, steps = None, 0, 0.0
-    while done < n and code == 0:  # a revolution at a time if its speed does not change
+    while done < n and code == 0:  # a whole revolution at a time if its speed is constant
         some = samples if done + samples <= n and speed[done + samples - 1] == speed[done] else 1
         at, first = engine.picked(numbers, every[done : done + 1]), y[done : done + 1] / scale[done]
         ran = engine(at, first, some, some, method, step=step, begin=begin[done : done + 1])
@@ -163,7 +159,7 @@ def _run(lanes: Lanes, samples: int, stretch: int, start: np.ndarray, method: Ab
         step, steps = ran.step if ran.step[0] else step, steps + float(ran.steps[0])
         peaks[done : done + ran.peaks.shape[1]], done = ran.peaks[0], done + some
     if done == 0:
-        y[0] = np.nan  # it may not start there
+        y[0] = np.nan  # the initial state is not allowed
     ends = np.flatnonzero(np.all(np.isfinite(y[1:]), axis=1))
     apart = np.zeros(n)
     for some in np.split(ends, range(CHUNK, ends.size, CHUNK)) if ends.size else ():
@@ -174,7 +170,7 @@ def _run(lanes: Lanes, samples: int, stretch: int, start: np.ndarray, method: Ab
 
 
 def _methods(method: AbstractMethod, system: AbstractForcedSystem) -> Iterator[AbstractMethod]:
-    """The method, finer ones for a run whose error is too large, and implicit ones."""
+    """Methods to try in turn: the method, finer ones, and implicit ones."""
     every = [method]
     if isinstance(method, NativeSteps) and has_implicit(system) and method.pair != IMPLICIT:
         every.append(method.implicit)
@@ -192,22 +188,22 @@ def simulate(
     start: Start | None = None,
     method: AbstractMethod | None = None,
 ) -> Trajectory:
-    """Time history at one speed.
+    """Simulate a time history at one speed.
 
-    **Arguments:** model; speed [rad/s] (of a whole bearing: of its shaft); revolutions recorded and discarded before
-    (of a whole bearing: of its cage); samples per revolution (they must divide the steps per revolution of a method
-    with fixed steps); initial state, by default the model's first start; integration method, by default
-    `jaxcage.native(1e-8)`, of a whole bearing `jaxcage.native(1e-5, 1e-2)`.
+    **Arguments:** model; speed [rad/s] (of the shaft for a whole bearing); revolutions recorded, and discarded before
+    (of the cage for a whole bearing); samples per revolution, which must divide the steps per revolution of a method
+    with fixed steps; initial state, by default the model's first one; integration method, by default
+    `jaxcage.native(1e-8)`, for a whole bearing `jaxcage.native(1e-5, 1e-2)`.
 
-    **Returns:** `Trajectory`; a run that fails, or is `inaccurate`, is NaN from there on and says why in `outcome`. A
-    whole bearing whose cage comes to rest, or leaves its land, is `outside`.
+    **Returns:** `Trajectory`; a run that fails, or is `inaccurate`, is NaN from there on, with the reason in `outcome`.
+    If the cage of a whole bearing comes to rest, or leaves its land, the outcome is `outside`.
 
     **Raises:** `ValueError` for a speed that is not positive, or impossible counts.
     """
     require_x64()
     require_known("simulate", INSTEAD, system, speed, start)
     options: dict[str, Any] = dict(revolutions=revolutions, samples=samples, discard=discard)
-    return ramp(system, speed, speed, **options, start=start, method=method)  # one that does not rise
+    return ramp(system, speed, speed, **options, start=start, method=method)  # a ramp with equal ends
 
 
 def ramp(
@@ -221,13 +217,13 @@ def ramp(
     start: Start | None = None,
     method: AbstractMethod | None = None,
 ) -> Trajectory:
-    """Time history of a true speed ramp: the speed changes continuously, by the same amount in every revolution.
+    """Simulate a speed ramp, in which the speed changes by the same amount in every revolution.
 
-    Within a revolution the speed rises in `samples` steps. The tangential force M e dw/dt of the unbalance is left out:
-    its ratio to M e w^2 is the relative change of speed in one radian.
+    Within a revolution the speed changes in `samples` steps or more. The tangential force M e dw/dt of the unbalance is
+    neglected: its ratio to M e w^2 is the relative change of speed per radian.
 
-    **Arguments:** model; first and last speed [rad/s]; number of revolutions of the whole ramp; `discard`:
-    revolutions at the first speed before it, which are left out; the rest as in `simulate`.
+    **Arguments:** model; first and last speed [rad/s]; revolutions of the whole ramp; `discard`, revolutions at the
+    first speed before it, which are left out; the rest as in `simulate`.
 
     **Returns:** `Trajectory` with the speed of each sample.
     """
@@ -247,7 +243,7 @@ def ramp(
     rises = np.where(numbers < 0, 0.0, rise)
     first_of = low + rise * np.maximum(numbers, 0)
     comparable = min(system.comparable(low), system.comparable(high))
-    parts = min(max(1, math.ceil(REVOLUTION / samples / comparable - 1e-9)), MOST_PARTS)  # from sample to sample
+    parts = min(max(1, math.ceil(REVOLUTION / samples / comparable - 1e-9)), MOST_PARTS)  # between two samples
     places = samples * parts
     speeds = (first_of[:, None] + rises[:, None] * ((np.arange(places) + 0.5) / places)).ravel()
     stretch = max(1, round(comparable * places / REVOLUTION))
@@ -257,7 +253,7 @@ def ramp(
     first_run = next(runs)
     ran = first_run if served(first_run) else next(filter(served, runs), first_run)
     states, code = ran.states.copy(), ran.code
-    if np.any(bad := ran.errors > chosen.allowed):  # behind a stretch whose error is too large nothing is known
+    if np.any(bad := ran.errors > chosen.allowed):  # states after a stretch with too large an error are not known
         states[int(np.argmax(bad)) * stretch + 1 :] = np.nan
         code = code or INACCURATE
 

@@ -1,9 +1,9 @@
-"""Diffrax solvers of our own: an L-stable Rosenbrock method, and the classical Runge-Kutta method.
+"""Our own diffrax solvers: an L-stable Rosenbrock method, and the classical Runge-Kutta method.
 
-A Rosenbrock method solves linear systems only, one matrix per step:
+A Rosenbrock method solves only linear systems, with one matrix per step:
     (shift I - J) U_i = f(t + alpha_i h, y + sum_j a_ij U_j) + sum_j c_ij U_j / h + gamma_i h df/dt,
     y_1 = y + sum_i m_i U_i,  error = sum_i e_i U_i,  shift = 1/(gamma h).
-The field's linearisation does the solve: for a second-order system it eliminates the positions in closed form.
+The field's linearisation provides the solver: for a second-order system it eliminates the positions in closed form.
 """
 
 from collections.abc import Callable
@@ -21,13 +21,13 @@ from ..models import AbstractField
 
 
 def combine(base: State, weights: Any, stages: list[State], factor: Scalar = 1.0) -> State:
-    """base + factor * sum of weights times stages, leaving out what is multiplied by zero."""
+    """Return base + factor * sum of weights times stages, without terms of zero weight."""
     used = [(float(w), u) for w, u in zip(weights, stages, strict=False) if w != 0.0]
     return tuple(b + factor * sum(w * u[i] for w, u in used) if used else b for i, b in enumerate(base))
 
 
 # E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), sec. VI.4 (their code RODAS), in
-# the form of sec. IV.7; sums of gamma_ij are those of the rows.
+# the form of sec. IV.7; GAMMA_SUM are the row sums of gamma_ij.
 GAMMA = 0.25
 ALPHA = (0.0, 0.386, 0.21, 0.63, 1.0, 1.0)
 GAMMA_SUM = (0.25, -0.1043, 0.1035, -0.03620000000000023, 0.0, 0.0)
@@ -59,12 +59,11 @@ def rosenbrock_step(
     y0: State,
     settle: Callable[[Any, Scalar], Any] = lambda x, t0: x,
 ) -> tuple[State, State, State, Scalar]:
-    """One step of `Rodas4` from y0 at phase t0, of the size that is told from the rate at its beginning.
+    """Take one step of `Rodas4` from y0 at phase t0, whose size is a function of the initial rate.
 
-    `settle` is told what had better be worked out in full before it is used, where the step is left to XLA's fusions.
+    `settle` is applied to intermediate results that XLA should not recompute (`computed_once`).
 
-    **Returns:** the new state, the error estimate of the embedded method, dy/dtau at the beginning of the step, and the
-    step.
+    **Returns:** new state, error estimate of the embedded method, dy/dtau at the beginning of the step, and step size.
     """
     near = settle(field.linearise(t0, y0), t0)
     h = size(near.value)
@@ -73,7 +72,7 @@ def rosenbrock_step(
     stages: list[State] = []
     rates = near.value
     for i, a_row in enumerate(A):
-        if any(a_row):  # else the stage is evaluated at (t0, y0) like the first
+        if any(a_row):  # otherwise the stage is evaluated at (t0, y0) like the first
             rates = field(t0 + ALPHA[i] * h, combine(y0, a_row, stages))
         r = combine(rates, C[i], stages, 1 / h)
         if GAMMA_SUM[i] != 0.0:
@@ -83,11 +82,11 @@ def rosenbrock_step(
 
 
 def computed_once(x: PyTree, t0: Scalar) -> PyTree:
-    """x as it is, worked out in full before anything makes use of it.
+    """Return x, computed completely before it is used.
 
-    XLA's CPU backend computes each output of a fused loop by itself, so that a step written in one piece evaluates the
-    same forces over and over: 3.6 times the run time, measured for Rodas4 on the cage. It drops optimisation barriers
-    before it fuses (jax 0.10.1), but computes the operands of a conditional once.
+    XLA's CPU backend computes each output of a fused loop separately, so that a step in one piece evaluates the same
+    forces repeatedly (3.6 times the run time, measured for Rodas4 on the cage). It drops optimisation barriers before
+    fusion (jax 0.10.1), but computes the operands of a conditional once.
     """
     return jax.lax.cond(
         jnp.isfinite(t0), lambda v: v, lambda v: jax.tree.map(lambda c: jnp.full_like(c, jnp.nan), v), x
@@ -95,8 +94,8 @@ def computed_once(x: PyTree, t0: Scalar) -> PyTree:
 
 
 class Rodas4(dfx.AbstractAdaptiveSolver):
-    """Six stages, order 4(3), stiffly accurate: a Rosenbrock method on an `AbstractField`, which travels as the `args`
-    of `diffrax.diffeqsolve`."""
+    """Stiffly accurate Rosenbrock method with six stages and order 4(3), for an `AbstractField`, which is passed as
+    `args` of `diffrax.diffeqsolve`."""
 
     term_structure: ClassVar = dfx.ODETerm
     interpolation_cls: ClassVar[Callable[..., dfx.AbstractLocalInterpolation]] = (
@@ -127,7 +126,7 @@ class Rodas4(dfx.AbstractAdaptiveSolver):
 
 
 class ClassicalRK4(dfx.AbstractERK):
-    """Kutta's method of 1901: four evaluations a step, order 4(3). Not for stiff systems.
+    """Kutta's method of 1901, with four evaluations per step and order 4(3), not for stiff systems.
 
     The error estimate h/6 (k_4 - f(y_1)) is that of the embedded third-order method with weights (1, 2, 2, 0, 1)/6,
     whose last stage is the first of the next step.
@@ -156,12 +155,8 @@ class ClassicalRK4(dfx.AbstractERK):
 def explicit_step(
     tableau: Any, field: AbstractField, t0: Scalar, size: Callable[[State], Scalar], y0: State
 ) -> tuple[State, Scalar]:
-    """One step from y0 at phase t0, for a method whose last stage is the first of the next step.
-
-    **Arguments:** `size` tells the step from the rate at its beginning.
-
-    **Returns:** the new state, the step.
-    """
+    """Take one step of an explicit FSAL method from y0 at phase t0, whose size is a function of the initial rate;
+    return the new state and the step size."""
     stages = [field(t0, y0)]
     h = size(stages[0])
     for c, row in zip(tableau.c, tableau.a_lower[:-1], strict=False):

@@ -1,7 +1,7 @@
 """Step control of the integration loop: the estimated error of a step, and the size of the next one.
 
-Errors are measured in units of the model's scale. A step ends at a strobe state, and near places where the law changes
-abruptly; a PI controller chooses the next one from the errors of this step and the last.
+Errors are measured in units of the model's scale. A step ends at a strobe state, and near abrupt changes of the law; a
+PI controller chooses the next one from the errors of this step and the last.
 """
 
 import math
@@ -13,15 +13,15 @@ from .layout import Field, Layout, Tableau, fixed_numbers
 
 
 SAFETY, LEAST_FACTOR, MOST_FACTOR = 0.9, 0.2, 6.0
-"""Step sizes change by the safety factor times what the error asks for, within these factors."""
+"""Safety factor of the step size, and limits of its change."""
 TANGENT_TOLERANCE = 10.0
 """Tolerance of tangent vectors relative to their length, as a multiple of that of the state."""
 NEAREST = 1e-4
-"""Time to an abrupt change of the law [rad] below which steps are not shortened any further."""
+"""Time to an abrupt change of the law [rad] below which steps are not shortened further."""
 
 
 def limited_step(w: Code, field: Field, rows: Layout, phase: Callable[[], Value], step: Value) -> Value:
-    """The step, shortened to end near an abrupt change of the law."""
+    """Step size, shortened so that the step ends near an abrupt change of the law."""
     n, state, rate = field.dimension, rows["state"][0], rows["rate"][0]
     near = w.all([*range(state, state + n), *range(rate, rate + n)])
     leading = [phase(), *near]
@@ -32,20 +32,20 @@ def limited_step(w: Code, field: Field, rows: Layout, phase: Callable[[], Value]
 
 
 def step_to_strobe(w: Code, limited: Value, left: Value) -> tuple[Value, Value, Value]:
-    """The step to take if `left` is left to the strobe state, and masks: it ends there; it is half of what is left."""
+    """Step size if `left` remains to the strobe state, and masks: the step ends there; it is half of what remains."""
     ends = w.compare("ge", w.mul(limited, number(1.0001)), left)
     halves = w.compare("gt", w.mul(limited, number(2.0)), left)
     return w.select(ends, left, w.select(halves, w.mul(left, number(0.5)), limited)), ends, halves
 
 
 def squared_error(w: Code, field: Field, rows: Layout, tableau: Tableau, step: Value, tolerance: Value) -> Value:
-    """Square of the largest estimated error of a step over the tolerance."""
+    """Squared ratio of the largest estimated error of a step to the tolerance."""
     n, span = field.dimension, field.span
     state, stage, again, rate = (rows[name][0] for name in ("state", "stage", "again", "rate"))
     terms = [(w.mul(step, number(e)), j) for j, e in enumerate(tableau.error) if e != 0.0]
 
     def estimate(at: Any, first: int) -> Value:
-        """Error of a number by its place among those that are integrated."""
+        """Estimated error of an integrated number by its row from `first` on."""
         if tableau.implicit:
             return w.get(at(first + again))
         return w.add(*(w.mul(e, w.get(at(first + rate + j * span))) for e, j in terms))
@@ -72,12 +72,12 @@ def squared_error(w: Code, field: Field, rows: Layout, tableau: Tableau, step: V
 def next_step(
     w: Code, order: int, step: Value, limited: Value, shorter: Value, fine: Value, bits: Value, last: Value, most: Value
 ) -> Value:
-    """The size of the next step; its factors are powers of the squared error: 0.7/order of this step and -0.4/order of
-    the last one.
+    """Size of the next step: a PI controller with the error of this step to the power -0.7/order, and that of the last
+    one to the power 0.4/order.
 
-    **Arguments:** order of the method; the step; its size before it was shortened to end at the strobe state or half
-    way to it; masks: it was shortened so, its error is allowed; binary logarithms of its squared error over the
-    tolerance, and of that of the last step that was accepted; largest step.
+    **Arguments:** order of the method; step; its size before it was shortened to end at the strobe state or half way to
+    it; masks: it was so shortened, it is accepted; binary logarithms of its squared error over the tolerance, and of
+    that of the last accepted step; largest step.
     """
     power = 0.5 / order
     grown = w.sub(w.mul(last, number(0.4 * power)), w.mul(bits, number(0.7 * power)))

@@ -1,7 +1,7 @@
-"""Machine code that JAX's compiled programs call, by XLA's typed interface for functions of others.
+"""Machine code called from JAX's compiled programs, by XLA's foreign-function interface.
 
-XLA hands over one struct, whose layout is that of version 0 of the interface (`xla/ffi/api/c_api.h` in the folder
-`jax.ffi.include_dir()`); smaller changes have numbers of their own, and leave the fields that are read here in place.
+XLA passes one struct, in the layout of major version 0 of the interface (`xla/ffi/api/c_api.h` in the folder
+`jax.ffi.include_dir()`); minor versions do not move the fields that are read here.
 """
 
 import ctypes
@@ -15,11 +15,11 @@ from .object_code import function
 
 
 MAJOR = 0
-"""Version of the interface that is known here."""
+"""Supported major version of the interface."""
 
 
 class UnknownInterface(Exception):
-    """The interface of this version of jaxlib is not the one that is known here."""
+    """Error for a version of jaxlib with an unsupported interface."""
 
 
 HANDLER = """%Version = type {{ i64, ptr, i32, i32 }}
@@ -79,14 +79,12 @@ done:
   ret void
 }}
 """
-"""XLA's function: it answers what XLA asks once (extension 1: its version), and calls `march(inputs, outputs)`."""
+"""Function that XLA calls: it answers a query of its version (extension 1), and calls `march(inputs, outputs)`."""
 
 
 def handler_ir(inputs: int, outputs: int) -> str:
-    """The function that XLA calls with so many inputs and outputs, for a module that holds `march`.
-
-    **Raises:** `UnknownInterface`.
-    """
+    """Function that XLA calls with these numbers of inputs and outputs, for a module that holds `march`. **Raises:**
+    `UnknownInterface`."""
     header = (pathlib.Path(jax.ffi.include_dir()) / "xla/ffi/api/c_api.h").read_text()
     found = re.search(r"XLA_FFI_API_MAJOR (\d+).*XLA_FFI_API_MINOR (\d+)", header, re.DOTALL)
     if found is None or int(found[1]) != MAJOR:
@@ -99,9 +97,9 @@ _registering = threading.Lock()
 
 
 def registered(ir: str, name: str) -> None:
-    """Have XLA know the `handler` of a module by a name; the code stays as long as the process."""
+    """Register the `handler` of a module with XLA under a name; its code remains until the process ends."""
     address = function(ir, "handler")
-    with _registering:  # threads may trace the same function at the same time
+    with _registering:  # several threads may trace the same function at the same time
         if name not in _registered:
             jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(ctypes.c_void_p(address)), platform="cpu")
             _registered[name] = address
