@@ -1,4 +1,4 @@
-"""Tables, figures and the report: numbers and data sets as people read them, with units converted when they are shown.
+"""Tables, figures and the report: results for people to read, with units converted for display.
 
 | module             | responsibility                                                        |
 |--------------------|-----------------------------------------------------------------------|
@@ -10,13 +10,14 @@
 | `orbit_figures`    | branches of periodic orbits, Floquet multipliers                      |
 | `maps`             | bifurcation curves, exponents and labels over speed and a parameter   |
 | `design_figures`   | elasticities, searches for better designs, chances of chaos           |
-| `zone_tables`      | zones found in a sweep or by a search, bifurcations, stable stretches |
+| `zone_tables`      | zones found in a sweep or by a search, bifurcations, stable ranges    |
 | `slope_tables`     | derivatives of edges, of lasting chaos, of means                      |
 | `quantity_tables`  | quantities over speed and of one run, statics                         |
 | `parameter_tables` | parameters with their sources, two designs compared                   |
 | `design_tables`    | designs before and after a search, shares of variance, tolerances     |
-| `chance_tables`    | chances of chaos, ranges that measurements narrowed                   |
+| `chance_tables`    | chances of chaos, ranges narrowed by measurements                     |
 | `operating`        | operating speeds and their place among the zones                      |
+| `verdict_tables`   | verdict on an operating range, what would decide or improve it        |
 | `report`           | answers of commands as one page of HTML                               |
 """
 
