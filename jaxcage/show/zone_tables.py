@@ -129,8 +129,8 @@ def _partner(span: Span, zones: Sequence[Zone]) -> int | None:
 
 
 def _details(title: str, zones: Sequence[Zone], key: str = "") -> list[Table]:
-    """Table of the mechanisms of the edges, share of chaotic initial states, and mean life of chaos [revolutions and
-    s], the latter for each speed; none without zones."""
+    """Table of the mechanisms of the edges, share of chaotic initial states, and mean life of chaos; none without
+    zones."""
     rows = []
     for i, zone in enumerate(zones, start=1):
         row = zone_record(zone) | {"zone": f"{i}: {zone_words(zone)}"}
