@@ -37,8 +37,6 @@ def check_layer(layer: dict[str, Any], names: str) -> None:
 
 
 def checked(f: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap `f` so that it checks its arguments against their annotations."""
-
     @functools.wraps(f)
     def run(*args: Any, **kwargs: Any) -> Any:
         check_call(f, *args, **kwargs)
@@ -51,10 +49,8 @@ _signature = functools.lru_cache(maxsize=1024)(inspect.signature)
 
 
 def check_call(f: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
-    """Check arguments, some of which may be missing, against the annotations of `f`.
-
-    **Raises:** `ArgumentError` for the first argument that does not match its annotation.
-    """
+    """Check arguments against the annotations of `f`; some may be missing. **Raises:** `ArgumentError` for the first
+    mismatch."""
     signature = _signature(f)
     try:
         given = signature.bind_partial(*args, **kwargs).arguments
@@ -209,10 +205,8 @@ def enable_x64() -> None:
 
 
 def require_x64() -> None:
-    """Require double precision and a version of JAX without known wrong results.
-
-    **Raises:** `RuntimeError` that says how to fix it.
-    """
+    """Require double precision. **Raises:** `RuntimeError` without it, or with a version of JAX that gives wrong
+    results."""
     if said := _wrong_results():
         raise RuntimeError(said)
     if not jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]

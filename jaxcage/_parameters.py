@@ -1,7 +1,6 @@
 """Physical parameters as fields of modules, each with its unit, allowed range and description.
 
-The declarations serve the configuration reader (units, ranges, unknown keys), `replace` and `parameters` (access by
-name), and every table of parameters.
+They serve the configuration reader, `replace` and `parameters` (access by name), and every table of parameters.
 """
 
 import dataclasses
@@ -104,10 +103,8 @@ NOT_GIVEN: Any = None
 
 
 def reading(text: str, **options: str) -> Any:
-    """Declare a choice between readings of the paper without a default; `options` describes each in words.
-
-    A module that holds one calls `require_readings` when it is created.
-    """
+    """Declare a choice between readings of the paper without a default; `options` describes each in words. A module
+    that holds one calls `require_readings` when it is created."""
     metadata = {"choice": tuple(options), "text": text, "readings": options}
     return eqx.field(static=True, default=NOT_GIVEN, metadata=metadata)
 
@@ -156,8 +153,8 @@ def part_path(part: Any) -> tuple[str, ...]:
 def fields_from(kind: type, parts: Mapping[str, Any], laws: tuple[Any, ...] = ()) -> dict[str, Any]:
     """Values of the fields of `kind` from parts by name.
 
-    Names that are not fields belong to the tuple `forces`: each part replaces the one of that name in `laws`, and
-    `extra` replaces all laws without a name.
+    Other names belong to the tuple `forces`: a part replaces that of its name in `laws`, `extra` all laws without a
+    name.
     """
     fields = {f.name for f in dataclasses.fields(kind)}
     given = {name: part for name, part in parts.items() if name not in fields}
@@ -200,7 +197,6 @@ def _declared(structure: Any, is_number: tuple[bool, ...]) -> tuple[Declared, ..
 
 
 def get(module: Any, path: tuple[str, ...]) -> Any:
-    """Value at `path` in `module`."""
     for name in path:
         module = _part(module, name)
     return module
@@ -258,10 +254,8 @@ _BASES = {  # exponents of mass, length and time
 
 
 def unit_dimensions(unit: str) -> dict[str, float]:
-    """Exponents of mass, length and time in a unit such as `N s/m` or `N/m^(10/9)`.
-
-    **Raises:** `ValueError` for a unit that is not made of 1, rad, K, kg, m, s, N, Pa.
-    """
+    """Exponents of mass, length and time in a unit such as `N s/m` or `N/m^(10/9)`. **Raises:** `ValueError` for a unit
+    that is not made of 1, rad, K, kg, m, s, N, Pa."""
     above, _, below = unit.partition("/")
     total = [0.0, 0.0, 0.0]
     for sign, factors in ((1, above), (-1, below)):

@@ -1,5 +1,4 @@
-"""Array types of public signatures (jaxtyping, checked in the tests only), and pytrees split into arrays and the
-rest."""
+"""Array types of public signatures (jaxtyping, checked in the tests only); pytrees split into arrays and the rest."""
 
 import functools
 import gc
@@ -30,7 +29,6 @@ class Form(NamedTuple):
     """None for each array; other leaves with their types, since 1 equals True."""
 
     def filled(self, arrays: Sequence[Any]) -> Any:
-        """Pytree with these arrays."""
         each = iter(arrays)
         return jax.tree.unflatten(self.tree, [next(each) if x is None else x[1] for x in self.rest])
 
@@ -43,8 +41,7 @@ def split(tree: Any, taken: Callable[[Any], bool] = lambda x: isinstance(x, ARRA
 
 
 def compiled(f: Callable[..., Any]) -> Callable[..., Any]:
-    """`equinox.filter_jit` without garbage collection during a call, which would take nearly half of the tracing
-    time."""
+    """`equinox.filter_jit` without garbage collection during calls, which takes nearly half of the tracing time."""
     jitted = eqx.filter_jit(f)
 
     @functools.wraps(f)

@@ -35,7 +35,7 @@ class Averages:
 
 @dataclasses.dataclass(frozen=True)
 class Quantity:
-    """A reported quantity."""
+    """Reported quantity: name, symbol, SI unit and description."""
 
     name: str
     symbol: str
@@ -75,8 +75,8 @@ def averaged(
 ) -> list[tuple[Quantity, Float[np.ndarray, " lanes"], Float[np.ndarray, "lanes blocks"]]]:
     """Each quantity with its value over a whole run and in each of its blocks.
 
-    **Arguments:** quantities; names of the integrals and of the maxima; both for each block; reference values of each
-    lane; revolutions of a block.
+    **Arguments:** quantities; names of the integrals and of the maxima; both per block; lanes' reference values;
+    revolutions per block.
     """
     named = lambda names, values: {name: values[..., i] for i, name in enumerate(names)}
     wide = {name: x[:, None] for name, x in numbers.items()}
@@ -144,8 +144,8 @@ def component_names(dimension: int) -> tuple[str, ...]:
 
 
 def notebook_html(self: Any) -> str:
-    """`str(self)` as HTML: the first line is the heading, the others are rows, split at gaps and after colons. Classes
-    use it as their method `_repr_html_`."""
+    """`str(self)` as HTML: a heading, then rows split at gaps and after colons. Classes use it as method
+    `_repr_html_`."""
     head, *lines = str(self).splitlines() or [""]
     rows = [re.split(r"\s{2,}|(?<=:)\s", line.strip()) for line in lines]
     cells = [[f'<td style="text-align: left">{html.escape(cell)}</td>' for cell in row] for row in rows]

@@ -32,7 +32,6 @@ class Answer:
     """Results of a command. The wrapper adds the case, the time, the files and the readings of the paper."""
 
     sentence: str
-    """The answer in one sentence."""
     tables: Sequence["Table"] = ()
     """Tables, the one that decides first; those with a key are also in the document."""
     notes: Sequence[str] = ()
@@ -87,10 +86,8 @@ def write(path: Path, content: Any) -> Path:
 
 
 def print_answer(answer: Answer, as_json: bool) -> None:
-    """Print an answer on standard output: one JSON document, or the sentence, the tables and the notes.
-
-    **Raises:** `OSError` if standard output cannot be written.
-    """
+    """Print an answer: one JSON document, or the sentence, the tables and the notes. **Raises:** `OSError` if standard
+    output cannot be written."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # file names need not be valid text
         sys.stdout.reconfigure(errors="backslashreplace")
     if as_json:

@@ -56,10 +56,8 @@ def text(
 
 
 def read_quantity(given: str, unit: str) -> float:
-    """Read a number in `unit`; a bare number is in `unit`, and a speed may say whether it is the shaft's or the cage's.
-
-    **Raises:** `ValueError` whose message follows the option's name.
-    """
+    """Read a number in `unit` unless it names its own; a speed may say whether it is the shaft's or the cage's.
+    **Raises:** `ValueError` whose message follows the option's name."""
     with contextlib.suppress(ValueError):
         return float(given)
     if not unit:
@@ -261,10 +259,8 @@ def _given(**options: Any) -> dict[str, Any]:
 
 
 def blocks_of(revolutions: int) -> int:
-    """Number of equal blocks of the observed revolutions, which give error bars.
-
-    **Raises:** `ValueError` for a number of revolutions that cannot be divided.
-    """
+    """Number of equal blocks of the observed revolutions, which give error bars. **Raises:** `ArgumentError` if there
+    is none."""
     if revolutions % 10 == 0:
         return 10 if revolutions % 20 else 20
     if (found := max(n for n in range(1, 21) if revolutions % n == 0)) == 1:

@@ -44,8 +44,8 @@ def zones(
 def explained(
     subject: Subject, found: Any, orbits: Any, answer: Answer, quick: bool, method: Any
 ) -> tuple[Answer, Any, dict[str, Any]]:
-    """Answer on a sweep with the mechanisms of its zones and the unstable ranges; the chaotic zones; and the
-    sensitivities of exact edges."""
+    """Answer on a sweep with the mechanisms of its zones and unstable ranges; chaotic zones; sensitivities of exact
+    edges."""
     name, beside, loss = subject.name, subject.beside, jc.unstable_ranges(orbits)
     known = jc.orbits.explain(jc.zones(found), orbits, subject.model, method)
     slopes = {} if quick else jc.show.edge_slopes(subject.model, loss, known, method)
@@ -60,10 +60,8 @@ def explained(
 
 
 def _searched(subject: Subject, over: o.Range, discard: int | None, method: Any, purpose: str = "") -> tuple[Any, Any]:
-    """Synchronous orbits over speed, and their unstable ranges.
-
-    **Raises:** `NoResult` if there are none, or no edges although the `purpose` needs some.
-    """
+    """Synchronous orbits over speed, and their unstable ranges. **Raises:** `NoResult` if there are none, or no edges
+    although the `purpose` needs some."""
     length: dict[str, Any] = {name: x for name, x in (("count", over.count), ("discard", discard)) if x is not None}
     told = {"method": method, "progress": report}
     found = jc.orbits.synchronous_orbits(subject.model, *subject.ends(over), **length, **told)

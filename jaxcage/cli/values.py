@@ -26,10 +26,7 @@ GRADE = re.compile(r"G\s*(\d+(?:\.\d*)?)", re.IGNORECASE)
 
 
 def read_vary(given: Sequence[str], subject: Subject) -> dict[str, Any]:
-    """Read every `NAME=VALUES` in SI units: an array, or a range to sample from.
-
-    **Raises:** `InputError`.
-    """
+    """Read every `NAME=VALUES` in SI units: an array, or a range to sample from. **Raises:** `InputError`."""
     found = _read_each("--vary", given, f"NAME=VALUES with {FORMS}", lambda name, text: _read(name, text, subject))
     if SPEED not in found:
         raise InputError("Option --vary must be given for the speed too, e.g. --vary speed=12000rpm.")
@@ -38,10 +35,7 @@ def read_vary(given: Sequence[str], subject: Subject) -> dict[str, Any]:
 
 
 def read_bounds(given: Sequence[str], subject: Subject) -> dict[str, tuple[float, float]]:
-    """Read every `NAME=LOWER:UPPER` of parameters to be varied in SI units; the usual ones if nothing is given.
-
-    **Raises:** `InputError`.
-    """
+    """Read every `NAME=LOWER:UPPER` in SI units; the usual ones if nothing is given. **Raises:** `InputError`."""
     model, names = subject.model, subject.usual((), jc.design.CAGE_PARAMETERS)
     if not given:
         usual, now = USUAL | subject.usual({}, WITH_ROLLERS), jc.parameters(model)
@@ -62,10 +56,8 @@ def read_bounds(given: Sequence[str], subject: Subject) -> dict[str, tuple[float
 
 
 def no_worse_balance(model: Any, vary: dict[str, tuple[float, float]]) -> list[str]:
-    """Lower the upper bound of the eccentricity to its present value, and return a note if this changes it.
-
-    **Raises:** `InputError` for bounds that do not let it become smaller.
-    """
+    """Lower the upper bound of the eccentricity to its present value, and return a note if this changes it. **Raises:**
+    `InputError` for bounds that do not let it become smaller."""
     (lower, upper), own = vary.get("eccentricity", (0.0, 0.0)), float(model.eccentricity)
     if upper <= own:
         return []
@@ -79,10 +71,8 @@ def no_worse_balance(model: Any, vary: dict[str, tuple[float, float]]) -> list[s
 
 
 def read_tolerances(text: str, subject: Subject, fastest: float) -> dict[str, Any]:
-    """Read `NAME=±X, NAME=G6.3, ...` in SI units; a grade refers to the largest cage speed [rad/s].
-
-    **Raises:** `InputError`.
-    """
+    """Read `NAME=±X, NAME=G6.3, ...` in SI units; a grade refers to the `fastest` cage speed [rad/s]. **Raises:**
+    `InputError`."""
     info, now = jc.parameter_info(subject.model), jc.parameters(subject.model)
 
     def read(name: str, words: str) -> Any:

@@ -54,8 +54,7 @@ CALLED |= {"x": "points", "y": "points"}
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with `arguments`, by default those of the process.
 
-    **Returns:** exit status: 0, 1 for a computation without a result, 2 for bad input, 130 when interrupted, 143 when
-    terminated.
+    **Returns:** exit status: 0, 1 for no result, 2 for bad input, 130 when interrupted, 143 when terminated.
     """
     if arguments is None:  # the process is ours, not a notebook's
         for name in ("stdout", "stderr"):  # a process without them writes to the null device
@@ -124,10 +123,8 @@ def _of_a_case(call: functools.partial[Answer], show: ShowOptions) -> Answer:
 
 
 def _about_options(error: ArgumentError, call: functools.partial[Answer]) -> Exception:
-    """Error about options, from one about the arguments of the library that they set.
-
-    An argument that no option sets is a bug, hence a `RuntimeError`.
-    """
+    """Error about options, from one about arguments of the library; a `RuntimeError`, for a bug, if no option sets
+    them."""
     options = {*call.keywords}
     for group in filter(dataclasses.is_dataclass, call.keywords.values()):
         options |= {field.name for field in dataclasses.fields(group)}  # pyright: ignore[reportArgumentType]
@@ -150,10 +147,7 @@ def _later(command: Callable[..., Answer]) -> Callable[..., functools.partial[An
 
 
 def _parse(arguments: list[str]) -> functools.partial[Answer] | None:
-    """Command with its options, or None after help or the version was printed.
-
-    **Raises:** `InputError`.
-    """
+    """Command with its options, or None after help or the version was printed. **Raises:** `InputError`."""
     import tyro
 
     if arguments == ["--version"]:
@@ -178,8 +172,7 @@ def _parse(arguments: list[str]) -> functools.partial[Answer] | None:
 def _sentence(box: str) -> str:
     """Text of an error box of tyro as one sentence.
 
-    Its parts are separated by rules; its title is in the upper border, or above a rule where the terminal has no line
-    drawing.
+    Parts are separated by rules; the title is in the upper border, or above a rule where there is no line drawing.
     """
     lines = [line.strip(" │") for line in box.splitlines()]
     is_rule = lambda line: not line.strip("─-╭╮╰╯") or line[0] == "╭"

@@ -52,8 +52,8 @@ def check_design(
     initial_states: int = 16,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Checked:
-    """Simulate a design over its operating range [rad/s] from its own and from random initial states, `initial_states`
-    in all.
+    """Simulate a design over its operating range [rad/s] from its own and random initial states, `initial_states` in
+    all.
 
     Adaptive steps in machine code are used, other steps than those of the orbits in the search.
     """

@@ -31,8 +31,7 @@ class Value(NamedTuple):
 
 
 class DesignSpace(eqx.Module):
-    """Design with bounds of some parameters: a differentiable function from a place, 0 to 1 in each parameter, to the
-    design there."""
+    """Design with bounds of some parameters: a differentiable function from a place, 0 to 1 in each, to a design."""
 
     system: AbstractForcedSystem
     lower: Float[np.ndarray, " n"]

@@ -44,8 +44,7 @@ the drag are accurate to 0.1 %, and to 2 % with 512 samples."""
 REACH = 0.5, 2.0
 """Limits of the speeds searched for edges, over the lower and the upper end of the operating range."""
 RIVAL = 0.02
-"""Local maxima over speed are refined if they are below the largest by less than this fraction of the spread of all
-values."""
+"""Local maxima over speed are refined if this fraction of the spread of all values or less below the largest."""
 FAR = 0.1  # largest change of an orbit from design to design, in units of the scale
 BESIDE = 1e-3  # relative distance from an edge within which orbits are ignored
 PEAKING = 0.8  # smaller maxima of the multiplier are ignored
@@ -94,8 +93,7 @@ def _read_moved(
 
 
 class Through(NamedTuple):
-    """Orbits over a range of speed at one place of the design space: ascending speeds [rad/s], states [SI] and moduli
-    of the largest multipliers."""
+    """Orbits of one design over a range: ascending speeds [rad/s], states [SI], moduli of the largest multipliers."""
 
     space: DesignSpace
     place: Float[np.ndarray, " n"]
@@ -105,8 +103,7 @@ class Through(NamedTuple):
 
     @classmethod
     def of(cls, space: DesignSpace, place: Float[np.ndarray, " n"], orbit: Orbit, low: float, high: float) -> "Through":
-        """Continue an orbit between two speeds, up to the nearest folds: beyond a fold there are other orbits at the
-        same speeds."""
+        """Continue an orbit between two speeds, up to the nearest folds, beyond which other orbits begin."""
         found = branch(space.model(place), orbit, lower=low, upper=high)
         speed, state = float(orbit.speed), np.asarray(orbit.state)
         away = np.abs(found.speed / speed - 1) + np.linalg.norm(found.state - state, axis=1) / np.linalg.norm(state)
@@ -181,8 +178,7 @@ def _reader(orbit: Orbit) -> AbstractMethod:
 
 
 class _Anchor(NamedTuple):
-    """Design at which edges are known; for a stable range also one of its orbits, in units of the scale, and its
-    speed."""
+    """Design at which edges are known; for a stable range also one of its orbits, over the scale, and its speed."""
 
     place: Float[np.ndarray, " n"]
     edges: Mapping[str, Point | None]
@@ -263,8 +259,8 @@ class OperatingRange(_AroundEdges):
     """Edges and orbits of designs around an operating range, and the values that requirements concern.
 
     An edge that ends on the way from design to design, or no longer bounds the stable range, is replaced by one that
-    does; `handed_over` records this in words. Orbits are followed over a `margin` beyond both ends as well, per cent of
-    their speeds.
+    does, which `handed_over` records. Orbits are followed over a `margin` beyond both ends too, per cent of their
+    speeds.
     """
 
     margin: float = 0.0

@@ -44,8 +44,8 @@ class Requirements:
 
 
 class Requirement(NamedTuple):
-    """One limit: its name, the quantity it concerns, the limit, 1 for a lower or -1 for an upper limit, its unit, and
-    the difference that gives a slack of 1."""
+    """One limit: its name, the quantity it concerns, the limit, 1 for a lower or -1 for an upper one, its unit, and the
+    difference that gives a slack of 1."""
 
     name: str
     of: str
@@ -131,8 +131,7 @@ def cost_function(cost: Cost | None, model: Any) -> Callable[[Any], Array]:
 
 
 class Tolerance(NamedTuple):
-    """Smallest and largest manufactured value [SI]: deviations from the nominal value or, if `absolute`, independent of
-    it."""
+    """Smallest and largest manufactured value [SI]: deviations from the nominal one or, if `absolute`, themselves."""
 
     lower: float
     upper: float
@@ -163,10 +162,8 @@ class Budget(NamedTuple):
 
 
 def widened(model: Any, vary: Bounds, tolerance: Mapping[str, Tolerance]) -> dict[str, tuple[float, float]]:
-    """Bounds of the varied parameters, and room around those that only have a tolerance.
-
-    **Raises:** `ValueError` for inconsistent tolerances.
-    """
+    """Bounds of the varied parameters, and room around those that only have a tolerance. **Raises:** `ValueError` for
+    inconsistent tolerances."""
     known, bounds = {n: float(x) for n, x in parameters(model).items()}, dict(vary)
     for name, each in tolerance.items():
         if name not in known:

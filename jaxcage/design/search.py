@@ -2,8 +2,8 @@
 
 Requirements are constraints of sequential programming in a trust region, with SciPy's SLSQP, or of an augmented
 Lagrangian minimised by optax. With tolerances, each requirement must hold for the worst bearing within them: signs of
-the gradient select the corner, and the edges are solved for there. The gradient there is that of the worst case (the
-envelope theorem).
+the gradient select the corner, where edges are solved for. The gradient there is that of the worst case (envelope
+theorem).
 """
 
 import dataclasses
@@ -117,8 +117,8 @@ class Design:
 class Problem:
     """Trials of one search, each computed once.
 
-    **Arguments:** operating range, or width of unstable ranges, which is then the cost; requirements; cost; mask of the
-    varied parameters; tolerances.
+    **Arguments:** operating range, or width of unstable ranges, which is then the cost; requirements; cost; mask of
+    what varies; tolerances.
     """
 
     def __init__(

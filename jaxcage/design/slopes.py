@@ -110,9 +110,8 @@ def _deviation(weight: np.ndarray, covariance: np.ndarray) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class StatisticGradient(Slopes):
-    """Slopes of a statistic, the mean over all designs and initial states; `drift`, the mean of the last block of the
-    runs minus that of the first, NaN for one block; `explained`, the share of the scatter of the pairs due to the
-    slopes."""
+    """Slopes of a statistic, the mean over all designs and initial states; `drift`, the last block's mean minus the
+    first's, NaN for one block; `explained`, the share of the scatter of the pairs due to the slopes."""
 
     drift: float
     drift_error: float
@@ -158,8 +157,7 @@ def mean_gradient(
 ) -> MeanGradient:
     """Gradients of statistics by parameters of the design, with standard errors.
 
-    **Arguments:** design; settings of the runs, in two blocks to see a drift; names of statistics, or statistics by
-    name;
+    **Arguments:** design; settings of the runs, in two blocks to see a drift; statistics, by name or as a mapping;
 
     - `directions`: parameters that are not 0; those joined by `+` change by the same factor.
     - `designs`: number of designs, even; each parameter is moved up in half of them and down in the others, by half of
@@ -168,11 +166,11 @@ def mean_gradient(
         the error of the slope is at most a sixth of spread^2 times the third derivative.
 
     **Returns:** `MeanGradient`. Standard errors come from the scatter of the designs around the fit, and include chaos,
-    coexisting motions and third-order curvature. The largest exponent need not depend smoothly on the design: its slope
-    is the mean slope over the box.
+    coexisting motions and third-order curvature. Slopes of the largest exponent, which need not be smooth, are means
+    over the box.
 
-    **Raises:** `ValueError` for parameters that are unknown or 0, a box that leaves a parameter's range, impossible
-    counts, or too few designs that finish.
+    **Raises:** `ValueError` for parameters that are unknown or 0, a box beyond a parameter's range, and too few
+    designs.
     """
     require_at_least(0, seed=seed)
     chosen = statistics_of(model, statistics)
@@ -199,8 +197,7 @@ def mean_gradient(
 
 
 def moved_parameters(model: AbstractForcedSystem, names: Sequence[str], argument: str) -> dict[str, float]:
-    """Values [SI] of parameters to be varied. **Raises:** `ValueError` for none, or one that is unknown, 0 or named
-    twice."""
+    """Values [SI] of parameters to vary. **Raises:** `ValueError` for none, or one that is unknown, 0 or repeated."""
     known = parameters(model)
     if not names:
         raise ArgumentError(argument, said="must hold at least one parameter, but it is empty.")
@@ -293,8 +290,7 @@ class ToleranceBudget:
 def tolerance_budget(of: Sensitivity | Slopes, deviation: Mapping[str, float]) -> ToleranceBudget:
     """First-order scatter of an edge from its exact derivatives, or of a statistic from its slopes.
 
-    **Arguments:** edge or statistic; standard deviation of each parameter relative to its value (t/sqrt(3) for a
-    uniform tolerance of ±t).
+    **Arguments:** edge or statistic; standard deviation of each parameter over its value (t/sqrt(3) for a uniform ±t).
 
     **Raises:** `ValueError` for a parameter without a derivative, or a negative deviation.
     """

@@ -43,8 +43,7 @@ TERMS: Mapping[str, tuple[str, ...]] = {
     **{"wear": ("+".join(WEAR),), "force": FORCES, "impulse": IMPULSES},
     **{"power": ("friction_power_W",), "slip": ("cage_slip",), "balance": (BALANCE,)},
 }
-"""Terms of the objective of a whole bearing: statistics relative to their present values; two in one term count half
-each."""
+"""Terms of the objective of a whole bearing: statistics over their present values; two in one term count half each."""
 BEARING_MEASURES = {name: name for name in COMPARED[:-1]} | {n: TERMS[n][0] for n in ("wear", "power", "slip")}
 """Statistic of a whole bearing by the name of a measure."""
 LEAST_SLIP, LEAST_SHARE = 1e-3, 0.01
@@ -82,8 +81,7 @@ class Runs:
 
     @classmethod
     def of_bearing(cls, speeds: Speeds, initial_states: Any = 4, discard: int = 10, revolutions: int = 20, **more: Any):
-        """Runs of a whole bearing in two blocks, from random positions of its cage; peaks are the largest in a
-        block."""
+        """Runs of a whole bearing in two blocks, from random positions of its cage; peaks are maxima of a block."""
         usual = {"blocks": 2, "exponents": 0, "tolerance": 1e-4, "seed": 0}
         return cls(speeds, initial_states, discard, revolutions, **usual | more)
 
@@ -144,8 +142,8 @@ class Statistic:
 
     unit: str
     samples: Callable[[Models, xr.Dataset], Any]
-    """Function of designs and their sweep that returns numbers of shape (designs, speeds, initial states, blocks),
-    whose mean is the value of each design."""
+    """Function of designs and their sweep; returns an array (designs, speeds, initial states, blocks), to be
+    averaged."""
 
     def values(self, runs: Runs) -> Callable[[Models], Float[np.ndarray, " designs"]]:
         """Function that runs designs and returns the value of each; NaN where a lane failed."""
@@ -221,8 +219,8 @@ def bearing_objective(model: AbstractForcedSystem, runs: Runs, prices: Mapping[s
 
     **Arguments:** the given bearing; settings of the runs; weights of the `TERMS` by name.
 
-    **Raises:** `ValueError` for unknown terms, weights that are negative or all 0, and a bearing that fails in each
-    run.
+    **Raises:** `ValueError` for unknown terms, weights that are negative or all 0, and a bearing that fails in all
+    runs.
     """
     if wrong := [name for name in prices if name not in TERMS]:
         raise ArgumentError("prices", said=f"must name some of {', '.join(TERMS)}, but has '{wrong[0]}'.")
@@ -270,8 +268,8 @@ def before_and_after(
 ) -> tuple[list[BeforeAfter], int]:
     """Compare statistics of two designs from the same initial states.
 
-    **Arguments:** designs; settings of the runs, best `Runs.fresh` of those of the search; names of statistics, or
-    statistics by name.
+    **Arguments:** designs; settings of the runs, best `Runs.fresh` of those of the search; statistics, by name or as a
+    mapping.
 
     **Returns:** a row for each statistic; the number of failed lanes, which are left out together with those of the
     other design at the same speed from the same initial state.

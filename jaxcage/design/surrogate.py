@@ -40,8 +40,8 @@ Values = Callable[[Models], Float[np.ndarray, " designs"]]
 @dataclasses.dataclass(frozen=True)
 class Optimum:
     """Best design of a search: varied parameters `values` [SI]; those `at_bound`, where the bound decides instead of
-    the objective; `history`, the best value of each batch. `changed` is False if no design was better than the given
-    one."""
+    the objective; `history`, the best value of each batch. `changed` is False if no design was better than the
+    first."""
 
     model: AbstractForcedSystem
     values: dict[str, float]
@@ -133,8 +133,8 @@ class SurrogateSearch:
         return places[chosen]
 
     def _candidates(self, lengths: Float[np.ndarray, " n"]) -> Places:
-        """Places in the trust region, which is wider in parameters with little effect; on average half of their
-        parameters are as in the best design."""
+        """Places in the trust region, wider in parameters of little effect; each keeps about half of the best
+        parameters."""
         middle = self.places[int(np.argmin(_known(self.values)))]
         half = 0.5 * self.region * np.clip(lengths / np.exp(np.mean(np.log(lengths))), 0.3, 3.0)
         low, high = np.clip(middle - half, 0, 1), np.clip(middle + half, 0, 1)

@@ -134,8 +134,7 @@ def _fitted(
     u = (rpm - edge) / window
 
     def solved(beta: Array) -> tuple[Array, Array]:
-        """Speed and its slopes, and the slope of log rate = a + b u + c u^2 + ..., at the root nearest to 0 where the
-        rate is one escape per horizon."""
+        """Speed and its slopes, and the slope of log rate = a + b u + c u^2 + ..., at its root nearest to 0."""
         a, b = beta[0] + math.log(horizon), beta[1]
         c = beta[2] if beta.size > 2 + len(names) else 0.0
         at = -2 * a / (b + jnp.sign(b) * jnp.sqrt(b * b - 4 * a * c))

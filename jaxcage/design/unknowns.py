@@ -121,8 +121,8 @@ class Ensemble:
 
     @property
     def interval(self) -> tuple[Float[np.ndarray, " speeds"], Float[np.ndarray, " speeds"]]:
-        """95 % confidence bounds of the chance (Clopper and Pearson), for the lower one with all failed draws calm, for
-        the upper one with all of them chaotic."""
+        """95 % bounds of the chance (Clopper and Pearson), with failed draws calm in the lower, chaotic in the upper
+        one."""
         (chaotic, of), draws = self.counts, len(self.place)
         return binomial_interval(chaotic, draws)[0], binomial_interval(chaotic + draws - of, draws)[1]
 

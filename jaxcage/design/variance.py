@@ -44,11 +44,12 @@ class SobolIndices:
 
     @property
     def warning(self) -> str | None:
-        """Warning of wide intervals, with the number of samples that should make them `NARROW`, since widths fall with
-        its root; None if there are none."""
+        """Warning of wide intervals, with the number of samples that should make them `NARROW`; None if there are
+        none."""
         if not self.doubtful:
             return None
         widest = max(b - a for pairs in (self.first_interval, self.total_interval) for a, b in pairs.values())
+        # Widths fall with the root of the number of samples.
         wanted = max(2 * self.samples, 1 << math.ceil(math.log2(self.samples * max(widest / NARROW, 1.0) ** 2)))
         return (
             f"Too few samples to believe the indices of {', '.join(self.doubtful)}: shares of a variance lie between 0 "
@@ -97,8 +98,7 @@ def global_sensitivity(
     f = by_block.mean(axis=1).reshape(n + 2, samples)
 
     def shares(f: np.ndarray) -> np.ndarray:
-        """First-order and total indices from values at both sample sets, and at the first with one column of the
-        second."""
+        """First-order and total indices from values at both sample sets, and at the first with one column swapped."""
         variance = np.var(f[:2], axis=(0, -1))
         change = f[2:] - f[0]
         both = np.stack([np.mean(f[1] * change, axis=-1), 0.5 * np.mean(change**2, axis=-1)])

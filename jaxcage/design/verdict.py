@@ -35,7 +35,7 @@ State = Literal["calm", "rattles", "not decided"]
 
 
 class RangeChance(NamedTuple):
-    """Numbers of draws that are chaotic at one or more speeds of a range, of draws for which this is known, and of
+    """Numbers of draws that are chaotic at one or more speeds of a range, of those for which this is known, and of
     all."""
 
     chaotic: int
@@ -62,8 +62,7 @@ class RangeChance(NamedTuple):
 
 
 def range_chance(found: Ensemble, low_rpm: float, high_rpm: float) -> tuple[RangeChance, Bool[np.ndarray, " draws"]]:
-    """Chance that a draw is calm at all speeds of a range [rpm], and True for draws that are chaotic somewhere in
-    it."""
+    """Chance that a draw is calm at all speeds of a range [rpm], and True for draws that are chaotic in some of it."""
     which = found.between(low_rpm, high_rpm)
     chaotic = np.any(found.chaotic[:, which] & ~found.failed[:, which], axis=1)
     known = chaotic | ~np.any(found.failed[:, which], axis=1)
@@ -87,8 +86,7 @@ class Index(NamedTuple):
 
 
 def indices(found: Ensemble, chaotic: Bool[np.ndarray, " draws"]) -> list[Index]:
-    """First-order indices of all unknown values for chaos somewhere in the range, the largest first; empty if all draws
-    agree."""
+    """First-order indices of all unknown values for chaos in the range, largest first; empty if all draws agree."""
     if np.all(chaotic == chaotic[0]):
         return []
     y, count = chaotic.astype(float), len(chaotic)
@@ -105,8 +103,8 @@ class Margins:
     """Distances of an operating range from the edges of the stable range, for the best guess of a design.
 
     `lower` and `upper` are in per cent of the speed at that end, with derivatives by relative changes of the
-    parameters. `decay` is the number of revolutions in which a small disturbance falls to 1/e at the worst speed,
-    infinite if it does not.
+    parameters. `decay` is the number of revolutions in which a small disturbance falls to 1/e at the worst speed, or
+    infinite.
     """
 
     lower: Value

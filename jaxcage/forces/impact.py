@@ -221,9 +221,7 @@ def pulse_train(
 
 class RollerPassForce(AbstractForcing):
     """Force of all roller passes by Fourier coefficients: the sum over k of a_k cos(k Z tau) + b_k sin(k Z tau) [N].
-
-    Each coefficient is a separate scalar, as the compiled kernels require.
-    """
+    Each coefficient is a separate scalar, as the compiled kernels require."""
 
     a_x: tuple[Scalar, ...]
     b_x: tuple[Scalar, ...]

@@ -111,8 +111,8 @@ def _bars_with_errors(
 
 
 def optimum_figure(found: "Optimum", rows: Sequence["BeforeAfter"], title: str = "") -> Figure:
-    """Figure of a search beside the relative changes of all nonzero statistics, with bars of two standard errors;
-    changes within them are grey."""
+    """Figure of a search, and relative changes of all nonzero statistics with two standard errors, grey if within
+    them."""
     shown = [row for row in rows if row.before]
     names = [readable(head_of(row.name, row.unit)) for row in shown]
 
@@ -152,8 +152,8 @@ def chance_of_chaos(found: "Ensemble", ax: Axes | None = None) -> Axes:
 
 
 def calm_figure(found: "Design", operating: tuple[float, float], title: str = "") -> Figure:
-    """Figure of the stable range of a cage before and after a search, beside the operating range, and of the costs of
-    the designs solved for.
+    """Figure of the stable range before and after a search, the operating range, and the costs of the designs solved
+    for.
 
     **Arguments:** the design; ends of the operating range of cage speed [rpm]; title.
     """

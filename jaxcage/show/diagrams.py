@@ -134,8 +134,8 @@ def reported(sweep: xr.Dataset, wanted: Sequence[str]) -> list[str]:
 
 
 def orbit_diagram(sweep: xr.Dataset, component: int = 1, ax: Axes | None = None) -> Axes:
-    """Orbit diagram: strobe states over speed from all initial states, coloured by label; failed lanes are crosses at
-    the bottom.
+    """Orbit diagram: strobe states over speed from all initial states, coloured by label; crosses at the bottom have
+    failed.
 
     **Arguments:** sweep; component of the state (1: vertical displacement of a cage); axes.
     """
@@ -241,8 +241,7 @@ def quantities_beside(
     differ: Sequence[Span] = (),
     title: str = "",
 ) -> Figure:
-    """Figure of variables of several sweeps, or ramps, over speed with a line for each; speed ranges [rpm] in which
-    they differ are shaded."""
+    """Figure of variables of several sweeps, or ramps, over speed; ranges [rpm] in which they differ are shaded."""
     lines = dict(zip(names, sweeps, strict=True))
     figure = _over_speed([partial(_lines, name=name, sweeps=lines) for name in quantities], title)
     rpm = sweeps[0]["rpm"].values

@@ -91,8 +91,7 @@ def orbit_diagram_with_branches(sweep: xr.Dataset, branches: Sequence[Branch], a
 
 
 def polyline(branch: Branch) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], Bool[np.ndarray, " n-1"]]:
-    """Speeds [rpm] and vertical displacements along a branch, special points included, and True for each stable
-    piece."""
+    """Speeds [rpm] and vertical displacements along a branch with its special points, and True for stable pieces."""
     x, y, stable = branch.speed_rpm, branch.state[:, 1] * SHOWN.factor, branch.stable
     pieces = stable[:-1] & stable[1:]
     done = branch.value.size

@@ -63,8 +63,7 @@ def quantities_table(title: str, found: xr.Dataset, names: Sequence[str]) -> Tab
 
 
 def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Table]:
-    """Tables of the quantities of one run with standard errors, and of spectral lines with the bearing's
-    frequencies."""
+    """Tables of quantities of one run with standard errors, and of spectral lines with the bearing's frequencies."""
     words = lambda q: q.text if len(q.text) <= LONGEST else head_of(q.name, q.unit)
     tables = [_values_table(title, ((words(q), value, q.unit, error) for q, value, error in found.values()))]
     columns = [Column("order of the cage's speed", "order", digits=3), "amplitude"]

@@ -1,5 +1,4 @@
-"""Figures of one run: displacements, forces and path of the cage, strobe section; rollers, slips, spectra; roller
-loads."""
+"""Figures of one run: displacements, forces, path and strobe section of the cage; rollers, slips, spectra, loads."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -80,10 +79,7 @@ def _over_time(
 
 
 def orbit(trajectory: Trajectory, clearance: float, ax: Axes | None = None) -> Axes:
-    """Path of the cage centre relative to the rib in the clearance circle, with a dot at each revolution.
-
-    **Arguments:** trajectory; radial clearance [m]; axes.
-    """
+    """Path of the cage centre relative to the rib in the clearance circle [m], with a dot at each revolution."""
     ax = style.axes_or_new(ax, 5.0, 5.0)
     path = trajectory.state[:, :2]
     if trajectory.state.shape[1] == 8:  # an elastic rib
@@ -264,8 +260,8 @@ def _spectrum(ax: Axes, spectrum: OrderSpectrum, orders: Mapping[str, float], yl
 
 
 def load_bars(distribution: LoadDistribution, ax: Axes | None = None) -> Axes:
-    """Bar chart of the load on the inner raceway of every roller over its angle from the load; dashed lines bound the
-    loaded zone."""
+    """Bar chart of the inner-raceway load of every roller over its angle from the load; dashed lines bound the loaded
+    zone."""
     ax = style.axes_or_new(ax, 7.0, 3.6)
     angles = (np.degrees(np.asarray(distribution.roller_angles)) + 270) % 360 - 180
     half = float(np.degrees(np.asarray(distribution.half_angle)))

@@ -120,7 +120,6 @@ def legend_above(ax: Axes, ncols: int = 4, size: float | int = 9) -> None:
 
 
 def legend_beside(ax: Axes, size: float | int = 9) -> None:
-    """Add a legend to the right of the frame."""
     place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
     enlarge_dots(ax.legend(**place, frameon=False, fontsize=size, handlelength=1.4))
 
@@ -136,7 +135,6 @@ def legend_below(figure: Figure, ncols: int = 5) -> None:
 
 
 def entitled(figure: Figure, title: str) -> Figure:
-    """Add a title at the upper left of a figure."""
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     return figure
 

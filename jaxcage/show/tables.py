@@ -24,7 +24,6 @@ OWN = "each its own"
 
 @functools.cache
 def factor(unit: str, shown: str) -> float:
-    """Factor from one unit to another."""
     if unit == shown or {unit, shown} <= {"1", ""}:
         return 1.0
     if (unit, shown) == ("1", "%"):

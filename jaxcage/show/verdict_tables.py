@@ -84,7 +84,7 @@ def changes_table(model: Any, found: Margins) -> Table:
 
 
 def indices_table(rows: Sequence[Index]) -> Table:
-    """Table of the values whose measurement would decide most, and the chance of rattling at the ends of their
+    """Table of the values whose measurement would decide most, with the chance of rattling at the ends of their
     ranges."""
     shown = [dict(r._asdict()) | dict(zip(("low", "high"), r.quarters, strict=True)) for r in rows if r.telling]
     columns = [Column("value", "label"), Column("of the verdict", "share", shown="%", error="error", digits=0)]

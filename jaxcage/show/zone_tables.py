@@ -1,5 +1,4 @@
-"""Tables of zones from a sweep or a search beside the published ones, of bifurcations, and of stable ranges of
-orbits."""
+"""Tables of zones beside the published ones, of bifurcations, and of stable ranges of orbits."""
 
 import math
 from collections.abc import Sequence
@@ -66,8 +65,8 @@ def motion_tables(
     published: PublishedCase | None = None,
     beside: Beside = None,
 ) -> list[Table]:
-    """Tables of chaotic zones, their edges and mean lives, and of transient chaos if there is any; or of speed ranges
-    with the same labels."""
+    """Tables of chaotic zones, their edges and mean lives, and transient chaos; or of speed ranges with the same
+    labels."""
     if not isinstance(found, Zones):
         rows = [vars(each) | {"motion": " or ".join(each.labels)} for each in found]
         columns = [Column("from", "low_rpm", digits=0), Column("to", "high_rpm", digits=0), "motion"]
@@ -88,8 +87,8 @@ def motion_tables(
 def unstable_table(
     name: str, found: SynchronousOrbits, loss: UnstableRanges, published: PublishedCase | None, beside: Beside = None
 ) -> Table:
-    """Table of the unstable ranges of the synchronous orbit, with each published (chaotic) zone beside the one it
-    overlaps most."""
+    """Table of the unstable ranges of the synchronous orbit, with each published (chaotic) zone beside its best
+    overlap."""
     title = f"Unstable ranges of the synchronous orbit of {name} [rpm], closed below {loss.close_below_rpm:.0f} rpm"
     between = found.lower_rpm, found.upper_rpm
     return _beside_published(title, "unstable_ranges", loss.zones, published, between, beside)
@@ -129,8 +128,7 @@ def _partner(span: Span, zones: Sequence[Zone]) -> int | None:
 
 
 def _details(title: str, zones: Sequence[Zone], key: str = "") -> list[Table]:
-    """Table of the mechanisms of the edges, share of chaotic initial states, and mean life of chaos; none without
-    zones."""
+    """Table of mechanisms of the edges, share of chaotic initial states, and mean life of chaos; none without zones."""
     rows = []
     for i, zone in enumerate(zones, start=1):
         row = zone_record(zone) | {"zone": f"{i}: {zone_words(zone)}"}
@@ -198,8 +196,7 @@ def edge_table(found: SynchronousOrbits, loss: UnstableRanges, beside: Beside = 
 
 
 def unsettled_notes(found: SynchronousOrbits) -> list[str]:
-    """Notes on bifurcations that were left out, uncertain stable ranges, and bifurcations that must have been
-    missed."""
+    """Notes on bifurcations that were left out, uncertain stable ranges, and missing bifurcations."""
     count = found.unsettled
     notes = [f"Left out: {count} bifurcations that half the steps put elsewhere (not converged)"] if count else []
     for s in found.stretches:
