@@ -71,7 +71,7 @@ def is_concrete(*values: object) -> bool:
 
 
 def require_at_least(least: int, **numbers: Any) -> None:
-    """**Raises:** `ArgumentError` for the first number below `least`; traced numbers pass."""
+    """Require numbers of at least `least`; traced ones pass. **Raises:** `ArgumentError` for the first that is less."""
     for name, value in numbers.items():
         if not isinstance(value, Tracer) and not value >= least:
             raise ArgumentError(name, said=f"must be at least {least}, but {shown(value)} was given.")

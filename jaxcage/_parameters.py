@@ -81,7 +81,7 @@ def parameter(
     source: str = "",
     **kwargs: Any,
 ) -> Any:
-    """Declare a differentiable parameter of a module, with `unit` (SI) and the closed range `[lower, upper]` allowed.
+    """Declare a differentiable parameter of a module, with its SI `unit` and the closed range `[lower, upper]` allowed.
 
     `kind` is the kind of its source, as in `SOURCES`; `source` says how to measure it.
 
@@ -115,7 +115,8 @@ def must_be_given(options: dict[str, str]) -> str:
 
 
 def require_readings(module: eqx.Module) -> None:
-    """**Raises:** `ValueError` for readings of `module` that are missing or not offered."""
+    """Require a valid choice for each reading of `module`. **Raises:** `ValueError` for one that is missing or
+    unknown."""
     fields = [f for f in dataclasses.fields(module) if "readings" in f.metadata]
     missing = [f for f in fields if getattr(module, f.name) is NOT_GIVEN]
     if missing:
@@ -153,8 +154,8 @@ def part_path(part: Any) -> tuple[str, ...]:
 def fields_from(kind: type, parts: Mapping[str, Any], laws: tuple[Any, ...] = ()) -> dict[str, Any]:
     """Values of the fields of `kind` from parts by name.
 
-    Other names belong to the tuple `forces`: a part replaces that of its name in `laws`, `extra` all laws without a
-    name.
+    Other names are laws in the tuple `forces`: each replaces the law of that name in `laws`, and `extra` replaces all
+    laws without a name.
     """
     fields = {f.name for f in dataclasses.fields(kind)}
     given = {name: part for name, part in parts.items() if name not in fields}
@@ -347,7 +348,7 @@ def within(numbers: Any, lower: float, upper: float) -> np.ndarray:
 
 
 def _require_range(name: str, value: Any, info: ParameterInfo) -> None:
-    """**Raises:** `ValueError` for a value outside its range; traced values pass."""
+    """Require a value within its range; traced ones pass. **Raises:** `ValueError` otherwise."""
     if isinstance(value, _NO_NUMBERS):
         raise ArgumentError(name, said=f"{allowed(info)}, but {reprlib.repr(value)} was given.")
     if isinstance(value, Tracer) or not isinstance(value, int | float | np.ndarray | np.generic | jax.Array):

@@ -259,8 +259,8 @@ def _given(**options: Any) -> dict[str, Any]:
 
 
 def blocks_of(revolutions: int) -> int:
-    """Number of equal blocks of the observed revolutions, which give error bars. **Raises:** `ArgumentError` if there
-    is none."""
+    """Number of equal blocks of the observed revolutions, for error bars. **Raises:** `ArgumentError` if they cannot be
+    divided."""
     if revolutions % 10 == 0:
         return 10 if revolutions % 20 else 20
     if (found := max(n for n in range(1, 21) if revolutions % n == 0)) == 1:

@@ -7,7 +7,7 @@
 | `operating`     | edges and orbits of an operating range, with exact derivatives by the design       |
 | `search`        | the cheapest design that keeps its requirements over an operating range            |
 | `check`         | simulations of a design from many initial states                                   |
-| `statistics`    | chaotic speeds, quantities and loads of designs from one sweep; comparisons       |
+| `statistics`    | chaotic speeds, quantities and loads of designs from one sweep; comparisons        |
 | `loads`         | loads of the guiding land, size and whirl of the motion                            |
 | `slopes`        | derivatives of statistics by paired designs; tolerance budgets                     |
 | `survival_edges`| edges of lasting chaos with slopes by survival regression; widths of zones         |

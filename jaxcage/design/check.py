@@ -55,7 +55,7 @@ def check_design(
     """Simulate a design over its operating range [rad/s] from its own and random initial states, `initial_states` in
     all.
 
-    Adaptive steps in machine code are used, other steps than those of the orbits in the search.
+    Steps are adaptive, in machine code, and thus independent of those of the orbits in the search.
     """
     speeds = np.linspace(*operating, SPEEDS)
     own = np.asarray(states_at(model, speeds, None))[:, :initial_states]

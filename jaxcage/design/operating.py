@@ -44,7 +44,7 @@ the drag are accurate to 0.1 %, and to 2 % with 512 samples."""
 REACH = 0.5, 2.0
 """Limits of the speeds searched for edges, over the lower and the upper end of the operating range."""
 RIVAL = 0.02
-"""Local maxima over speed are refined if this fraction of the spread of all values or less below the largest."""
+"""Local maxima over speed are refined within this fraction of the spread of values from the largest one."""
 FAR = 0.1  # largest change of an orbit from design to design, in units of the scale
 BESIDE = 1e-3  # relative distance from an edge within which orbits are ignored
 PEAKING = 0.8  # smaller maxima of the multiplier are ignored
@@ -103,7 +103,7 @@ class Through(NamedTuple):
 
     @classmethod
     def of(cls, space: DesignSpace, place: Float[np.ndarray, " n"], orbit: Orbit, low: float, high: float) -> "Through":
-        """Continue an orbit between two speeds, up to the nearest folds, beyond which other orbits begin."""
+        """Continue an orbit between two speeds, up to the nearest folds, where the branch turns back in speed."""
         found = branch(space.model(place), orbit, lower=low, upper=high)
         speed, state = float(orbit.speed), np.asarray(orbit.state)
         away = np.abs(found.speed / speed - 1) + np.linalg.norm(found.state - state, axis=1) / np.linalg.norm(state)

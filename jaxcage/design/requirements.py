@@ -131,7 +131,7 @@ def cost_function(cost: Cost | None, model: Any) -> Callable[[Any], Array]:
 
 
 class Tolerance(NamedTuple):
-    """Smallest and largest manufactured value [SI]: deviations from the nominal one or, if `absolute`, themselves."""
+    """Smallest and largest manufactured value [SI], as deviations from the nominal value unless `absolute`."""
 
     lower: float
     upper: float
@@ -143,7 +143,7 @@ class Tolerance(NamedTuple):
         return cls(0.0, 1e-3 * grade / speed, absolute=True)
 
     def times(self, factor: float) -> "Tolerance":
-        """Tolerance widened by a factor."""
+        """Tolerance wider by a factor."""
         return self._replace(lower=factor * self.lower, upper=factor * self.upper)
 
     def ends(self, value: float) -> tuple[float, float]:

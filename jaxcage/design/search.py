@@ -71,7 +71,7 @@ class Design:
         prevent a feasible design, empty if there is one.
     - `prices`: cost of one unit more of each binding requirement (Lagrange multipliers).
     - `at_bound`: parameters at a bound; `worst`: value of each requirement for the worst bearing within the tolerances.
-    - `stopped_by`: reason why a design close by lost an edge, empty if none did; `notes`: edges that were replaced.
+    - `stopped_by`: reason why a nearby design lost an edge, empty if none did; `notes`: edges that were replaced.
     - `budget`: admissible width of each tolerance.
     - `evaluations`: number of designs whose edges were solved for; `checked`: simulations from many initial states.
     """
@@ -298,7 +298,7 @@ def _programme(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) 
         if new.lost:
             radius, largest = reach / 2, reach / 4  # a longer step would lose the edge again
         elif kept < 0.25:
-            radius = reach if kept <= 0.1 and not refused else reach / 2  # repeated first with the added linearisation
+            radius = reach if kept <= 0.1 and not refused else reach / 2  # the first retry only adds a linearisation
         elif kept > 0.75:
             radius, largest = min(2 * radius, largest), min(2 * largest, LARGEST_RADIUS)
         if kept > 0.1 and not new.lost:

@@ -169,8 +169,8 @@ def mean_gradient(
     coexisting motions and third-order curvature. Slopes of the largest exponent, which need not be smooth, are means
     over the box.
 
-    **Raises:** `ValueError` for parameters that are unknown or 0, a box beyond a parameter's range, and too few
-    designs.
+    **Raises:** `ValueError` for parameters that are unknown or 0, a box beyond a parameter's range, impossible counts,
+    and too few designs that finish.
     """
     require_at_least(0, seed=seed)
     chosen = statistics_of(model, statistics)

@@ -86,8 +86,8 @@ class Runs:
         return cls(speeds, initial_states, discard, revolutions, **usual | more)
 
     def fresh(self, number: int = 1, initial_states: int = 8) -> "Runs":
-        """Independent runs for a check: other random initial states, twice as many other speeds of the range, twice as
-        many discarded revolutions, and a tenth of the tolerance. Each `number` from 1 on gives another draw."""
+        """Independent runs for a check: other random initial states, twice as many speeds elsewhere in the range, twice
+        as many discarded revolutions, and a tenth of the tolerance. Each `number` from 1 on gives another draw."""
         speeds, seed = self.speed, (self.seed or 0) + number
         if (n := 2 * speeds.size) > 2:
             share = (np.arange(n) + np.random.default_rng(seed).uniform(size=n)) / n
@@ -126,7 +126,7 @@ def drawn_states(
     if model.samples > 1:
         return np.asarray(_rolling_states(model, jnp.asarray(speed), jnp.asarray(drawn_places(count, seed))))
     size = SPREAD * np.array([[float(x) for x in model.scale(s)] for s in speed.tolist()])
-    size[:, size.shape[1] // 2 :] *= 0.3  # velocities, of the clearance times the speed
+    size[:, size.shape[1] // 2 :] *= 0.3  # velocities, relative to clearance times speed
     return size[:, None] * np.random.default_rng(seed).uniform(-1, 1, (count, size.shape[1]))
 
 
@@ -138,12 +138,12 @@ def _rolling_states(model: Any, speeds: Array, places: Array) -> Float[Array, "s
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Statistic:
-    """Number of each design that is computed from a sweep of all."""
+    """Scalar statistic of designs, computed from one sweep of all of them."""
 
     unit: str
     samples: Callable[[Models, xr.Dataset], Any]
-    """Function of designs and their sweep; returns an array (designs, speeds, initial states, blocks), to be
-    averaged."""
+    """Function of designs and their sweep that returns an array (designs, speeds, initial states, blocks); the mean
+    over all but the first axis gives the value of each design."""
 
     def values(self, runs: Runs) -> Callable[[Models], Float[np.ndarray, " designs"]]:
         """Function that runs designs and returns the value of each; NaN where a lane failed."""

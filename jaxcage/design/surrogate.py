@@ -23,7 +23,7 @@ from .design_space import Bounds, DesignSpace, Models, Places
 AT_BOUND = 0.01
 """Distance from a bound, relative to the span, within which a parameter counts as at the bound."""
 CANDIDATES = 512
-"""Number of places at which a sample is compared."""
+"""Number of candidate places at which a sample is minimised."""
 FIRST, SMALLEST = 0.6, 0.02
 """First and smallest size of the trust region, relative to the spans; below the smallest it starts again."""
 LENGTH, NOISE = 0.7, 0.05
@@ -40,8 +40,7 @@ Values = Callable[[Models], Float[np.ndarray, " designs"]]
 @dataclasses.dataclass(frozen=True)
 class Optimum:
     """Best design of a search: varied parameters `values` [SI]; those `at_bound`, where the bound decides instead of
-    the objective; `history`, the best value of each batch. `changed` is False if no design was better than the
-    first."""
+    the objective; `history`, the best value of each batch; `changed`, False if no design was better."""
 
     model: AbstractForcedSystem
     values: dict[str, float]
@@ -72,7 +71,7 @@ def surrogate_search(
     **Arguments:** design; bounds [SI] by parameter name, which contain the design; function of a list of designs that
     returns their values; `confirm`, the same with other or longer runs, by which the best few designs and the given one
     are compared again, since the least of many noisy values is biased; number and size of batches, of which the first
-    cover the bounds and include the given design; seed; function called with batches done and of all.
+    cover the bounds and include the given design; seed; function called with the batches done and all.
 
     **Raises:** `ValueError` for unknown parameters, bounds that do not ascend or do not hold the design, no batch, and
     batches of fewer than 2 designs.
@@ -133,8 +132,8 @@ class SurrogateSearch:
         return places[chosen]
 
     def _candidates(self, lengths: Float[np.ndarray, " n"]) -> Places:
-        """Places in the trust region, wider in parameters of little effect; each keeps about half of the best
-        parameters."""
+        """Places in the trust region, which is wider in parameters of little effect; each keeps about half of the
+        parameters of the best design."""
         middle = self.places[int(np.argmin(_known(self.values)))]
         half = 0.5 * self.region * np.clip(lengths / np.exp(np.mean(np.log(lengths))), 0.3, 3.0)
         low, high = np.clip(middle - half, 0, 1), np.clip(middle + half, 0, 1)

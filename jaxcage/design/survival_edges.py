@@ -2,7 +2,7 @@
 
 At such an edge the mean life of chaos equals the horizon. No chaotic trajectory is differentiated: many lanes, each at
 its own speed and with its own design near the edge, leave chaos at a rate whose logarithm is linear in speed and
-parameters. The edge is where the rate is one escape per horizon; the ratio of the two slopes gives its derivatives.
+parameters. The edge is where the rate is one escape per horizon; ratios of the slopes give its derivatives.
 """
 
 import dataclasses

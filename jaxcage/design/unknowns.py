@@ -1,7 +1,8 @@
 """Cages with parameters known only within ranges: chances of chaos, and ranges narrowed by measurements.
 
 Each draw is a design with values from the ranges; it runs once at every speed, from the conventional initial state. At
-one speed the draws are independent, so that their chaotic share has a binomial error bar; different speeds are not.
+one speed the draws are independent, so that their chaotic share has a binomial error bar; different speeds are
+not independent.
 
 Ranges are narrowed by approximate Bayesian computation with rejection (S. A. Sisson, Y. Fan and M. A. Beaumont,
 Handbook of Approximate Bayesian Computation (2018)): uniform draws from the ranges run at the measured speeds, and a
@@ -40,7 +41,7 @@ ERROR = 1e-2
 RARE = 0.05
 """Chance up to which a speed is called calm; from 1 - RARE on it is called chaotic."""
 FEWEST = 29
-"""Least number of draws for a verdict: with a chance of 10 %, so many draws hold no chaotic one once in 20 times."""
+"""Least number of draws for a verdict: at a chance of 10 %, this many contain no chaotic one in 5 % of cases."""
 CONFIDENCE = 0.95
 BINS = 4
 """Number of parts of a range whose chances are compared, to estimate how much an unknown explains."""
@@ -121,8 +122,8 @@ class Ensemble:
 
     @property
     def interval(self) -> tuple[Float[np.ndarray, " speeds"], Float[np.ndarray, " speeds"]]:
-        """95 % bounds of the chance (Clopper and Pearson), with failed draws calm in the lower, chaotic in the upper
-        one."""
+        """95 % bounds of the chance (Clopper and Pearson), with failed draws counted as calm in the lower and as
+        chaotic in the upper one."""
         (chaotic, of), draws = self.counts, len(self.place)
         return binomial_interval(chaotic, draws)[0], binomial_interval(chaotic + draws - of, draws)[1]
 

@@ -62,7 +62,7 @@ class RangeChance(NamedTuple):
 
 
 def range_chance(found: Ensemble, low_rpm: float, high_rpm: float) -> tuple[RangeChance, Bool[np.ndarray, " draws"]]:
-    """Chance that a draw is calm at all speeds of a range [rpm], and True for draws that are chaotic in some of it."""
+    """Chance that a draw is calm at all speeds of a range [rpm], and True for the draws that are chaotic in it."""
     which = found.between(low_rpm, high_rpm)
     chaotic = np.any(found.chaotic[:, which] & ~found.failed[:, which], axis=1)
     known = chaotic | ~np.any(found.failed[:, which], axis=1)

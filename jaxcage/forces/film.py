@@ -81,8 +81,8 @@ def film_drive(x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar) -> V
 def arc_centre(model: FilmModel, direction: Vector, drive: Vector, least: Scalar) -> Vector:
     """Unit vector u to the middle of the pressurised half circle; (0, 0) for `full`.
 
-    **Arguments:** film model; direction of the position; drive P; a small drive that makes the direction of P regular
-    at 0.
+    **Arguments:** film model; direction of the position; drive P; a small drive that regularises the direction of P
+    where P = 0.
     """
     if model == "full":
         return 0.0, 0.0

@@ -231,7 +231,7 @@ class RollerPassForce(AbstractForcing):
 
     def force(self, motion: Motion) -> Force:
         first, rise = cos_sin(self.n_rollers * motion.phase)
-        now, before = (1.0, 0.0), (first, -rise)  # cosine and sine of k Z tau, by the recurrence of Chebyshev
+        now, before = (1.0, 0.0), (first, -rise)  # cosine and sine of k Z tau, by Chebyshev's recurrence
         x = y = jnp.zeros(())
         for a_x, b_x, a_y, b_y in zip(self.a_x, self.b_x, self.a_y, self.b_y, strict=True):
             c, s = now

@@ -70,8 +70,8 @@ def pulse_integrals(share: Scalar, swing: Scalar, phase: Scalar, harmonics: int)
     **Arguments:** the bar's share beta = M_c/(M_w + M_c) of the mass; `swing`, the bar's angular frequency kappa, and
     the `phase` of the first harmonic in a unit of time; the number of harmonics.
 
-    **Returns:** integrals in units of m v_0 with m = M_w beta, and of P/v_0 with P = (m v_0^2/K)^(9/19); NaN after
-    `MOST_STEPS`.
+    **Returns:** integrals in units of m v_0 with m = M_w beta, and of P/v_0 with P = (m v_0^2/K)^(9/19); NaN for an
+    impact that takes more than `MOST_STEPS`.
     """
     return _program(harmonics)(jnp.stack([share, swing, phase]))
 

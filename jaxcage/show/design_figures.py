@@ -111,8 +111,8 @@ def _bars_with_errors(
 
 
 def optimum_figure(found: "Optimum", rows: Sequence["BeforeAfter"], title: str = "") -> Figure:
-    """Figure of a search, and relative changes of all nonzero statistics with two standard errors, grey if within
-    them."""
+    """Figure of the progress of a search, and of the relative changes of all nonzero statistics with two standard
+    errors, grey if within them."""
     shown = [row for row in rows if row.before]
     names = [readable(head_of(row.name, row.unit)) for row in shown]
 

@@ -12,7 +12,7 @@ from .tables import OWN, UNIT, Beside, Column, Table, speed_columns, table
 MOST = 8
 """Largest number of parameters in a budget."""
 IDLE = 1.5
-"""Factor of a wider tolerance above which the given one is reported as needlessly tight."""
+"""A tolerance that may be wider by more than this factor is reported as needlessly tight."""
 
 
 def changed_table(title: str, model: Any, found: Optimum | Design, vary: Mapping[str, tuple[float, float]]) -> Table:

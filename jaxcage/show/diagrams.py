@@ -134,8 +134,8 @@ def reported(sweep: xr.Dataset, wanted: Sequence[str]) -> list[str]:
 
 
 def orbit_diagram(sweep: xr.Dataset, component: int = 1, ax: Axes | None = None) -> Axes:
-    """Orbit diagram: strobe states over speed from all initial states, coloured by label; crosses at the bottom have
-    failed.
+    """Orbit diagram: strobe states over speed from all initial states, coloured by label; failed lanes are crosses at
+    the bottom.
 
     **Arguments:** sweep; component of the state (1: vertical displacement of a cage); axes.
     """

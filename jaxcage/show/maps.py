@@ -30,7 +30,7 @@ SPEED = "speed"
 BELOW, ABOVE = 0.8, 1.25
 """Default range of a parameter, over its value."""
 STEEPEST = 0.3
-"""Largest exponent, positive or negative, of the colour scale."""
+"""Largest absolute exponent of the colour scale."""
 MAPPED = ("cage_slip", "friction_power_W")
 """Quantities in a map, if the model reports them."""
 RPM = 30 / np.pi

@@ -37,8 +37,8 @@ class Operating:
 def read_operating(text: str, model: AbstractForcedSystem, unsaid: Whose | None = None) -> tuple[Operating, ...]:
     """Read speeds and ranges such as `8500, 12000-15000`, `900 rad/s, 1200 to 1500 rad/s` or `20000-24000 rpm shaft`.
 
-    **Arguments:** the text, in rpm unless it names a unit; the model; owner of unnamed speeds, by default that of the
-    model.
+    **Arguments:** the text, in rpm unless it names a unit; the model; `cage` or `shaft` for speeds that do not name
+    one, by default that of the model.
 
     **Returns:** speeds of the model.
 

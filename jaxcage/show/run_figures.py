@@ -79,7 +79,8 @@ def _over_time(
 
 
 def orbit(trajectory: Trajectory, clearance: float, ax: Axes | None = None) -> Axes:
-    """Path of the cage centre relative to the rib in the clearance circle [m], with a dot at each revolution."""
+    """Path of the cage centre relative to the rib, in the circle of the radial clearance [m], with a dot per
+    revolution."""
     ax = style.axes_or_new(ax, 5.0, 5.0)
     path = trajectory.state[:, :2]
     if trajectory.state.shape[1] == 8:  # an elastic rib

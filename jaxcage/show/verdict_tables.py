@@ -154,7 +154,7 @@ READ = "cage_slip", "pocket_force_max_N", "friction_power_W"
 
 
 def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float) -> list[str]:
-    """Note that compares the load of a bearing [N] with the makers' rules for the least load."""
+    """Note that compares the load of a bearing [N] with the makers' rules for the minimum load."""
     like, rating = listed_like(bearing), static_load_rating(bearing)
     rules = [
         ("C0/60, with C0 by ISO 76" if like is None else f"C0/60 of {like.designation}", like and like.static_rating)

@@ -19,7 +19,7 @@ Span = tuple[float, float | None]
 
 
 def require_some(found: xr.Dataset, where: str = "") -> None:
-    """**Raises:** `NoResult` if every lane failed, with their number, `where`, and their outcomes."""
+    """Require a lane that did not fail. **Raises:** `NoResult` with their number, `where`, and their outcomes."""
     if failed(found).all():
         said = f"All {found['label'].size} simulations{where} failed ({', '.join(sorted(outcomes(found)))})"
         raise NoResult(f"{said}: try more steps (--steps).")
@@ -87,8 +87,8 @@ def motion_tables(
 def unstable_table(
     name: str, found: SynchronousOrbits, loss: UnstableRanges, published: PublishedCase | None, beside: Beside = None
 ) -> Table:
-    """Table of the unstable ranges of the synchronous orbit, with each published (chaotic) zone beside its best
-    overlap."""
+    """Table of the unstable ranges of the synchronous orbit, each with the published (chaotic) zones that overlap it
+    most."""
     title = f"Unstable ranges of the synchronous orbit of {name} [rpm], closed below {loss.close_below_rpm:.0f} rpm"
     between = found.lower_rpm, found.upper_rpm
     return _beside_published(title, "unstable_ranges", loss.zones, published, between, beside)
@@ -196,7 +196,7 @@ def edge_table(found: SynchronousOrbits, loss: UnstableRanges, beside: Beside = 
 
 
 def unsettled_notes(found: SynchronousOrbits) -> list[str]:
-    """Notes on bifurcations that were left out, uncertain stable ranges, and missing bifurcations."""
+    """Notes on bifurcations left out, uncertain stable ranges, and changes of stability without a bifurcation."""
     count = found.unsettled
     notes = [f"Left out: {count} bifurcations that half the steps put elsewhere (not converged)"] if count else []
     for s in found.stretches:
