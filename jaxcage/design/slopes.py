@@ -276,7 +276,7 @@ class ToleranceBudget:
 
     @property
     def unclear(self) -> tuple[str, ...]:
-        """Parameters whose deviation has an error, and is at most twice as large."""
+        """Parameters whose deviation is at most twice its error, if it has one."""
         return tuple(name for name, x in self.deviation.items() if x <= 2 * self.error[name] > 0)
 
     def __str__(self) -> str:

@@ -1,8 +1,7 @@
 """Cages with parameters known only within ranges: chances of chaos, and ranges narrowed by measurements.
 
-Each draw is a design with values from the ranges; it runs once at every speed, from the conventional initial state. At
-one speed the draws are independent, so that their chaotic share has a binomial error bar; different speeds are
-not independent.
+Each draw is a design with values from the ranges; it runs once at every speed, from the conventional initial state.
+Draws are independent at one speed, so that their chaotic share has a binomial error bar, but not from speed to speed.
 
 Ranges are narrowed by approximate Bayesian computation with rejection (S. A. Sisson, Y. Fan and M. A. Beaumont,
 Handbook of Approximate Bayesian Computation (2018)): uniform draws from the ranges run at the measured speeds, and a

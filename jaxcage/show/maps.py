@@ -127,7 +127,8 @@ def top_exponent(found: xr.Dataset) -> Float[np.ndarray, "x y"]:
 def stability_map(axis: Axis, curves: Sequence[Curve], ax: Axes | None = None, found: xr.Dataset | None = None) -> Axes:
     """Bifurcation curves over speed and a parameter, coloured by kind.
 
-    **Arguments:** the parameter; curves; axes; a map of labels, whose largest exponents are drawn below, white at zero.
+    **Arguments:** the parameter; curves; axes; a map of labels, whose largest exponents are drawn beneath, white at
+    zero.
 
     **Raises:** `ValueError` if a curve is over anything else.
     """

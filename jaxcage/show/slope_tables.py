@@ -87,7 +87,7 @@ def residual_words(edges: Mapping[str, Sensitivity]) -> str:
 
 
 def source_notes(explained: Explained) -> list[str]:
-    """Notes on the edges of chaotic zones that coincide with something exact."""
+    """Notes on the edges of chaotic zones that coincide with a bifurcation or the limit of a cascade."""
     edges = [e for zone in explained.zones.zones for e in (zone.onset, zone.exit) if e is not None]
     statistical = sum(e.basis == "statistical" for e in edges)
     notes = [f"Chaotic edges that stay statistical: {statistical} of {len(edges)}"]

@@ -19,7 +19,8 @@ Span = tuple[float, float | None]
 
 
 def require_some(found: xr.Dataset, where: str = "") -> None:
-    """Require a lane that did not fail. **Raises:** `NoResult` with their number, `where`, and their outcomes."""
+    """Require a lane that did not fail. **Raises:** `NoResult` with the number of lanes, `where`, and their
+    outcomes."""
     if failed(found).all():
         said = f"All {found['label'].size} simulations{where} failed ({', '.join(sorted(outcomes(found)))})"
         raise NoResult(f"{said}: try more steps (--steps).")
