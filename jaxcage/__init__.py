@@ -6,9 +6,9 @@
 | `forces`   | rib film, land contact, pocket impact, support, unbalance, gravity: one law a file    |
 | `models`   | the forced-system protocol; the cage in its rib, the whole bearing, oscillators       |
 | `files`    | TOML in and out, units, safe writing                                                 |
-| `solve`    | the engine: many lanes in machine code or by diffrax; time histories, the strobe map  |
+| `solve`    | integration in machine code or by diffrax; time histories, the strobe (Poincaré) map  |
 | `analysis` | exponents, labels, zones, spectra, survival of chaos, stability, measures             |
-| `lanes`    | plans of lanes, their runs, the data set of a run; sweeps, studies, maps              |
+| `lanes`    | the trajectories (lanes) of sweeps, studies and maps, and their data sets             |
 | `orbits`   | periodic orbits, branches, bifurcation points and their derivatives                  |
 | `design`   | objectives, statistics with gradients, optimisation, tolerances, identified constants |
 | `show`     | figures, tables, columns of numbers, the HTML page                                   |
@@ -22,9 +22,8 @@ import os as _os
 from typing import TYPE_CHECKING as _TYPE_CHECKING, Any as _Any
 
 
-# XLA's loader reports every program kept on disk as an error on processors for which it has tuning flags of its own.
-# What really goes wrong is raised as an exception. JAX itself sets the variable to 1, also for the processes that a
-# script starts; whoever wants XLA's log sets it to 0.
+# XLA logs an error for every cached program on processors for which it has tuning flags of its own. Genuine errors are
+# raised as exceptions. JAX sets the variable to 1, also for child processes; set it to 0 to see XLA's log.
 if _os.environ.get("TF_CPP_MIN_LOG_LEVEL", "1") == "1":
     _os.environ["TF_CPP_MIN_LOG_LEVEL"] = "3"
 
@@ -39,7 +38,7 @@ __version__ = "0.1.0"
 
 
 def __getattr__(name: str) -> _Any:
-    """Load the library with the first name asked of it: `jaxcage --help` asks for none, and answers without JAX."""
+    """Import the library on first access to a public name, so that `jaxcage --help` works without JAX."""
     if not name.startswith("_"):
         public = _importlib.import_module("._public", __name__)
         globals().update({n: value for n, value in vars(public).items() if not n.startswith("_")})

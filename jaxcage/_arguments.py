@@ -1,7 +1,7 @@
-"""Arguments of public functions compared with their annotations before anything is done: one mechanism for all.
+"""Validation of the arguments of public functions against their annotations.
 
-What an argument may be is read off its annotation: whole numbers, numbers, real arrays, names of a choice, models. What
-is traced passes: it has no value yet. Bounds of numbers are asked for by the functions themselves.
+An annotation may ask for whole numbers, numbers, real arrays, literals or models. Traced arguments pass, since they
+have no value yet. Bounds of numbers are checked by the functions themselves.
 """
 
 import functools
@@ -22,14 +22,14 @@ from ._errors import ArgumentError, shown as shown
 
 
 MOST = 10_000_000
-"""Of anything that is counted: more ends in no memory, or in no lifetime."""
+"""Largest count that is accepted; larger ones exceed memory or never finish."""
 WHOLE = "a whole number"
 _REAL = "biuf"
 _ARRAYS = (jax.Array, np.ndarray, np.generic)
 
 
 def check_layer(layer: dict[str, Any], names: str) -> None:
-    """Have these functions of a layer compare their arguments; called at the end of its `__init__`."""
+    """Make the named functions of a layer check their arguments; called at the end of its `__init__`."""
     for name in names.split():
         f = layer[name]
         layer[name] = checked(f)
@@ -37,8 +37,6 @@ def check_layer(layer: dict[str, Any], names: str) -> None:
 
 
 def checked(f: Callable[..., Any]) -> Callable[..., Any]:
-    """`f`, which compares its arguments with their annotations first."""
-
     @functools.wraps(f)
     def run(*args: Any, **kwargs: Any) -> Any:
         check_call(f, *args, **kwargs)
@@ -51,15 +49,13 @@ _signature = functools.lru_cache(maxsize=1024)(inspect.signature)
 
 
 def check_call(f: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
-    """Compare arguments with the annotations of `f`; some of them may be missing.
-
-    **Raises:** `ArgumentError` for the first that is not what its annotation says.
-    """
+    """Check arguments against the annotations of `f`; some may be missing. **Raises:** `ArgumentError` for the first
+    mismatch."""
     signature = _signature(f)
     try:
         given = signature.bind_partial(*args, **kwargs).arguments
     except TypeError:
-        return  # Python says it as it always does, where `f` is called
+        return  # Python reports it when `f` is called
     for name, value in given.items():
         parameter = signature.parameters[name]
         several = parameter.kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
@@ -75,14 +71,14 @@ def is_concrete(*values: object) -> bool:
 
 
 def require_at_least(least: int, **numbers: Any) -> None:
-    """**Raises:** `ArgumentError` for a number below `least`, by its name; what is traced passes."""
+    """Require numbers of at least `least`; traced ones pass. **Raises:** `ArgumentError` for the first that is less."""
     for name, value in numbers.items():
         if not isinstance(value, Tracer) and not value >= least:
             raise ArgumentError(name, said=f"must be at least {least}, but {shown(value)} was given.")
 
 
 def options(annotation: Any) -> tuple[Any, ...]:
-    """The members of a union, or the annotation alone; of a type variable those of its bound."""
+    """Members of a union or of the bound of a type variable, or else the annotation itself."""
     if isinstance(annotation, typing.TypeVar) and annotation.__bound__ is not None:
         return options(annotation.__bound__)
     if typing.get_origin(annotation) in (typing.Union, types.UnionType):
@@ -91,13 +87,13 @@ def options(annotation: Any) -> tuple[Any, ...]:
 
 
 def wrong(annotation: Any, value: Any, in_row: bool = False) -> str:
-    """Words for what an argument must be; empty if it is that, or if its annotation does not say."""
+    """Description of what an argument must be; empty if it matches its annotation."""
     members = options(annotation)
     if _is_traced(value) or (value is None and types.NoneType in members):
         return ""
     if isinstance(value, _ARRAYS) and not _is_real(value, any("Complex" in str(m) for m in members)):
         return "of real numbers, without a mask"
-    may_miss = in_row or any(map(is_array_type, members))  # NaN, as a quantity or a part of a state may be
+    may_miss = in_row or any(map(is_array_type, members))  # NaN is allowed in quantities and states
     said = [_wrong_one(member, value, may_miss) for member in members if member is not types.NoneType]
     if not all(said):
         return ""
@@ -105,7 +101,6 @@ def wrong(annotation: Any, value: Any, in_row: bool = False) -> str:
 
 
 def _wrong_one(kind: Any, value: Any, may_miss: bool) -> str:
-    """The same for a member of a union."""
     origin, inside = typing.get_origin(kind), typing.get_args(kind)
     if kind is float or (is_array_type(kind) and kind.dim_str == ""):
         return _wrong_number(value, may_miss)
@@ -152,23 +147,23 @@ def _wrong_number(value: Any, may_miss: bool) -> str:
 
 
 def _is_traced(value: Any) -> bool:
-    """True if a value, or anything in a row of them, is still to come."""
+    """True if a value, or an element of a tuple or list, is traced."""
     return any(isinstance(x, Tracer) for x in (value if isinstance(value, tuple | list) else (value,)))
 
 
 def is_array_type(kind: Any) -> bool:
-    """True for an annotation of jaxtyping."""
+    """True for a jaxtyping annotation."""
     return getattr(kind, "dim_str", None) is not None
 
 
 def is_plain_class(kind: Any) -> bool:
-    """True for a class whose instances can be told."""
+    """True for a class that `isinstance` can check."""
     simple = inspect.isclass(kind) and not is_array_type(kind) and typing.get_origin(kind) is None
     return simple and kind is not typing.Any and not getattr(kind, "_is_protocol", False)
 
 
 def _is_real(value: Any, with_imaginary: bool) -> bool:
-    """True if an array holds numbers and nothing else."""
+    """True if an array is numeric, complex only if allowed, and not masked."""
     if isinstance(value, np.ma.MaskedArray):
         return False
     try:
@@ -186,7 +181,7 @@ def _is_count(value: Any) -> bool:
     return isinstance(value, int) and abs(value) <= MOST
 
 
-# Double precision is on, and JAX is of no version that is known to give wrong numbers.
+# Double precision, and versions of JAX that are known to give wrong results.
 
 BAD_JAX = {
     "0.10.2": "https://github.com/jax-ml/jax/issues/39103",
@@ -195,7 +190,7 @@ BAD_JAX = {
 
 
 def _wrong_results() -> str:
-    """A sentence about a version of JAX that gives wrong results; empty for all others."""
+    """Message about a version of JAX that gives wrong results; empty for all others."""
     issue = BAD_JAX.get(jax.__version__)
     return f"JAX {jax.__version__} gives wrong results ({issue}): install jax==0.10.1." if issue else ""
 
@@ -205,15 +200,13 @@ if jax.__version__ in BAD_JAX:
 
 
 def enable_x64() -> None:
-    """Make JAX compute in double precision, for the whole process: a script's first line after `import jaxcage`."""
+    """Make JAX compute in double precision in the whole process; call it right after `import jaxcage`."""
     jax.config.update("jax_enable_x64", True)
 
 
 def require_x64() -> None:
-    """Stop unless JAX computes in double precision and is of a version that computes correctly.
-
-    **Raises:** `RuntimeError`, with the line that cures it.
-    """
+    """Require double precision. **Raises:** `RuntimeError` without it, or with a version of JAX that gives wrong
+    results."""
     if said := _wrong_results():
         raise RuntimeError(said)
     if not jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]

@@ -1,4 +1,4 @@
-"""Compiled programs kept on disk, so that the second run of a command starts at once."""
+"""Cache of compiled programs on disk, so that later runs of a command start at once."""
 
 import hashlib
 import os
@@ -14,18 +14,18 @@ from ._errors import ArgumentError
 
 
 def keep_compiled_programs(folder: str | os.PathLike[str] | None = None) -> pathlib.Path | None:
-    """Keep what is compiled in a folder and use it again, in this process and later ones.
+    """Cache compiled programs in a folder, and reuse them in this process and later ones.
 
-    The `jaxcage` command calls this by default; a script or notebook may. It changes JAX's configuration of the whole
-    process. Programs are made for the processor they were compiled on: each kind of processor has its own sub-folder.
+    The `jaxcage` command does this by default; scripts and notebooks may call it. It changes JAX's configuration of the
+    whole process. Each kind of processor has its own sub-folder, since programs are compiled for one.
 
-    **Arguments:** where to keep them, by default the user's cache folder. The environment variable `JAXCAGE_CACHE`
-    names another one, or switches this off if it is `off`.
+    **Arguments:** folder, by default the user's cache folder. The environment variable `JAXCAGE_CACHE` overrides it, or
+    disables the cache if it is `off`.
 
-    What is kept there is run without being looked at: the folder is made for its user alone, and one that belongs to
-    another user, that others may write to, or that cannot be written to is left alone, with a warning.
+    Cached programs run without verification: the folder is created for this user alone, and one that another user owns
+    or may write to, or that is not writable, is not used, with a warning.
 
-    **Returns:** the folder, None if switched off or left alone.
+    **Returns:** the folder; None if the cache is disabled or the folder is not used.
     """
     if not isinstance(folder, str | os.PathLike | None):
         raise ArgumentError("folder", said=f"must be a path, but {folder!r} was given.")
@@ -51,7 +51,7 @@ def keep_compiled_programs(folder: str | os.PathLike[str] | None = None) -> path
 
 
 def unfit(place: pathlib.Path) -> str:
-    """Make a folder for this user alone. **Returns:** why it cannot be used, empty if it can."""
+    """Create a folder for this user alone, and return why it cannot be used; empty if it can."""
     place.mkdir(parents=True, exist_ok=True, mode=0o700)
     about = place.stat()
     if os.name == "posix":
@@ -64,7 +64,7 @@ def unfit(place: pathlib.Path) -> str:
 
 
 def _processor() -> str:
-    """A short name of this kind of processor: what a program compiled for it may use."""
+    """Short hash of the features of this processor that a compiled program may use."""
     about = [platform.machine(), platform.processor()]
     info = pathlib.Path("/proc/cpuinfo")
     if info.exists():

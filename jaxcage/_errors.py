@@ -1,4 +1,4 @@
-"""What goes wrong, in sentences that are shown as they are, by a script and by the command alike."""
+"""Exceptions whose messages are complete sentences, shown as they are by scripts and by the command."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,11 +7,11 @@ import numpy as np
 
 
 class InputError(ValueError):
-    """Bad input, in one sentence that names what was given and what is allowed."""
+    """Invalid input; the message names what was given and what is allowed."""
 
 
 class ArgumentError(InputError):
-    """The same of arguments, by their names: a function's are called `so`, and an option of the command --so."""
+    """Invalid arguments, by name: shown as `name` for a function and as --name for an option of the command."""
 
     def __init__(self, *names: str, said: str = ""):
         super().__init__(*names)
@@ -21,23 +21,23 @@ class ArgumentError(InputError):
         return self.about("Argument", lambda name: f"`{name}`")
 
     def about(self, what: str, called: Callable[[str], str]) -> str:
-        """The sentence, about arguments that go by other names."""
+        """Message that calls the arguments by other names."""
         *most, last = map(called, self.names)
         return f"{what}s {', '.join(most)} and {last} {self.said}" if most else f"{what} {last} {self.said}"
 
 
 class NoResult(Exception):
-    """A computation without a result, in one sentence that says why."""
+    """Computation without a result; the message says why."""
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it."""
+    """Text of a value for messages."""
     plain = bool | int | float | complex | str
     row = isinstance(value, tuple | list) and all(isinstance(x, plain) for x in value)
     if row or isinstance(value, plain | np.generic):
         try:
             text = repr(value) if row or isinstance(value, str | complex) else str(value)
-        except ValueError:  # of thousands of digits
+        except ValueError:  # an integer with thousands of digits
             return f"a very large {type(value).__name__}"
         return text if len(text) < 100 else f"{text[:100]}..."
     if kind_of := getattr(value, "dtype", None):

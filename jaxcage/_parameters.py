@@ -1,7 +1,6 @@
-"""Physical parameters as fields of modules: each carries its unit, the range it makes sense in, and words.
+"""Physical parameters as fields of modules, each with its unit, allowed range and description.
 
-What is declared here once is used by the configuration reader (units, ranges, unknown keys), by `replace` and
-`parameters` (access by name), and by every table that lists parameters.
+They serve the configuration reader, `replace` and `parameters` (access by name), and every table of parameters.
 """
 
 import dataclasses
@@ -34,32 +33,31 @@ SOURCES: dict[Kind, str] = {
     "unknown": "nobody knows it unless it is measured",
     "fixed": "constant of nature, of a law, or numerical",
 }
-"""Kinds of parameters, and where a value comes from."""
+"""Usual source of a value, by kind of parameter."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ParameterInfo:
-    """What is known of a parameter beside its value: SI unit, closed range of sensible values, description, source."""
+    """Declaration of a parameter: SI unit, closed range of allowed values, description, source."""
 
     unit: str
     lower: float
     upper: float
     text: str
     kind: Kind = "fixed"
-    """Who knows it."""
+    """Kind of source, see `SOURCES`."""
     source: str = ""
-    """Where its value comes from, or what to measure."""
+    """Source of the value, or how to measure it."""
 
 
 UNKNOWN = "?"
 """Unit of a parameter that is not declared."""
 EXTRA = "extra"
-"""Prefix of the numbers of laws that a user wrote: they are parameters, declared or not, and are named after the class
-of the law, `extra.MyDrag.coefficient`."""
+"""Prefix of the parameters of user-defined laws, declared or not, e.g. `extra.MyDrag.coefficient`."""
 
 
 def _as_leaf(x: Any) -> Any:
-    """Python numbers become float64 leaves; arrays, tracers and the placeholders of tree surgery pass."""
+    """Convert Python numbers to float64 arrays; arrays, tracers and placeholders pass unchanged."""
     return jnp.asarray(np.asarray(x, dtype=float)) if isinstance(x, int | float) else x
 
 
@@ -67,7 +65,7 @@ _NO_NUMBERS = (str, bytes, bool, complex, list, tuple, dict, set, np.ma.MaskedAr
 
 
 def _leaf_of(info: "ParameterInfo", x: Any) -> Any:
-    """The same for a declared parameter. **Raises:** `ValueError` for what is no number and no array of real ones."""
+    """Convert the value of a declared parameter. **Raises:** `ValueError` unless it is real, a number or an array."""
     if isinstance(x, _NO_NUMBERS) or (isinstance(x, np.ndarray | np.generic) and x.dtype.kind not in "iuf"):
         raise InputError(f"The {info.text} {allowed(info)}, but {x!r} was given.")
     return _as_leaf(x)
@@ -83,9 +81,9 @@ def parameter(
     source: str = "",
     **kwargs: Any,
 ) -> Any:
-    """A differentiable leaf of a module, with `unit` (SI) and the closed range `[lower, upper]` users may give.
+    """Declare a differentiable parameter of a module, with its SI `unit` and the closed range `[lower, upper]` allowed.
 
-    `kind` says who knows it, or `source` what to measure.
+    `kind` is the kind of its source, as in `SOURCES`; `source` says how to measure it.
 
     **Raises:** `ValueError` for a unit that is not made of 1, rad, K, kg, m, s, N, Pa.
     """
@@ -96,30 +94,29 @@ def parameter(
 
 
 def choice(*options: str, text: str, **kwargs: Any) -> Any:
-    """A static field that takes one of `options`."""
+    """Declare a static field that takes one of `options`."""
     return eqx.field(static=True, metadata={"choice": options, "text": text}, **kwargs)
 
 
 NOT_GIVEN: Any = None
-"""In the place of a reading that nobody chose: `__check_init__` refuses it."""
+"""Placeholder for a reading that was not chosen; `__check_init__` rejects it."""
 
 
 def reading(text: str, **options: str) -> Any:
-    """A choice between two readings of the paper that has no default: `options` says in words what each means.
-
-    A module that holds one calls `require_readings` when it is made.
-    """
+    """Declare a choice between readings of the paper without a default; `options` describes each in words. A module
+    that holds one calls `require_readings` when it is created."""
     metadata = {"choice": tuple(options), "text": text, "readings": options}
     return eqx.field(static=True, default=NOT_GIVEN, metadata=metadata)
 
 
 def must_be_given(options: dict[str, str]) -> str:
-    """What is said of a reading that nobody chose."""
+    """Message for a reading that was not chosen."""
     return "must be given, " + " or ".join(f'"{name}" ({words})' for name, words in options.items())
 
 
 def require_readings(module: eqx.Module) -> None:
-    """**Raises:** `ValueError`, one sentence, for readings of `module` that were left out or that it does not offer."""
+    """Require a valid choice for each reading of `module`. **Raises:** `ValueError` for one that is missing or
+    unknown."""
     fields = [f for f in dataclasses.fields(module) if "readings" in f.metadata]
     missing = [f for f in fields if getattr(module, f.name) is NOT_GIVEN]
     if missing:
@@ -133,32 +130,32 @@ def require_readings(module: eqx.Module) -> None:
 
 
 def readings_of(module: eqx.Module) -> dict[str, tuple[str, str]]:
-    """Reading by name, with what it means in words."""
+    """Chosen reading and its description, by name."""
     fields = [f for f in dataclasses.fields(module) if "readings" in f.metadata]
     return {f.name: (getattr(module, f.name), f.metadata["readings"][getattr(module, f.name)]) for f in fields}
 
 
 def count(lower: int, upper: int, text: str, **kwargs: Any) -> Any:
-    """A static whole number, e.g. of rollers."""
+    """Declare a static integer field, e.g. a number of rollers."""
     return eqx.field(static=True, metadata={"count": (lower, upper), "text": text}, **kwargs)
 
 
 def with_numbers(modules: Any) -> Any:
-    """Modules of a user with their plain numbers as leaves that can be differentiated."""
+    """Convert plain numbers in a user's modules to differentiable leaves."""
     return jax.tree.map(lambda x: x if isinstance(x, bool) else _as_leaf(x), modules)
 
 
 def part_path(part: Any) -> tuple[str, ...]:
-    """Path by which a model knows a part that it holds in a tuple: `film` by its name, a user's as `extra.MyDrag`."""
+    """Path of a part that a model holds in a tuple: `film` by its name, a user's law as `extra.MyDrag`."""
     name = getattr(type(part), "law_name", "")
     return (name,) if name else (EXTRA, type(part).__name__)
 
 
 def fields_from(kind: type, parts: Mapping[str, Any], laws: tuple[Any, ...] = ()) -> dict[str, Any]:
-    """Values of fields of `kind` from parts by name.
+    """Values of the fields of `kind` from parts by name.
 
-    A name that is no field belongs to the tuple `forces`: the part takes the place of the one of `laws` of that name,
-    and `extra` the place of all laws that have no name.
+    Other names are laws in the tuple `forces`: each replaces the law of that name in `laws`, and `extra` replaces all
+    laws without a name.
     """
     fields = {f.name for f in dataclasses.fields(kind)}
     given = {name: part for name, part in parts.items() if name not in fields}
@@ -171,18 +168,18 @@ def fields_from(kind: type, parts: Mapping[str, Any], laws: tuple[Any, ...] = ()
 
 
 Declared = tuple[tuple[str, ...], dataclasses.Field]
-"""A declared field with its path of attribute names."""
+"""Path of attribute names to a declared field, and the field."""
 
 
 def walk(module: eqx.Module) -> tuple[Declared, ...]:
-    """Every declared field below `module`, depth first, and the plain numbers of laws that a user wrote."""
+    """All declared fields below `module`, depth first, and the plain numbers of user-defined laws."""
     leaves, structure = jax.tree.flatten(module)
     return _declared(structure, tuple(eqx.is_inexact_array(leaf) for leaf in leaves))
 
 
 @functools.lru_cache(maxsize=256)
 def _declared(structure: Any, is_number: tuple[bool, ...]) -> tuple[Declared, ...]:
-    """The declared fields of modules of one structure: they are many, and asked for with every change of a design."""
+    """Declared fields of modules of one structure; cached, since every change of a design asks for them."""
 
     def below(module: eqx.Module, path: tuple[str, ...], own: bool) -> Iterator[Declared]:
         for field in dataclasses.fields(module):
@@ -201,21 +198,20 @@ def _declared(structure: Any, is_number: tuple[bool, ...]) -> tuple[Declared, ..
 
 
 def get(module: Any, path: tuple[str, ...]) -> Any:
-    """What `module` has at `path`."""
     for name in path:
         module = _part(module, name)
     return module
 
 
 def _part(module: Any, name: str) -> Any:
-    """An attribute; of several modules, the one of that class."""
+    """Attribute of a module, or the member of a tuple of modules with this class name."""
     if isinstance(module, tuple):
         return next(each for each in module if type(each).__name__ == name)
     return getattr(module, name)
 
 
 def parameter_paths(module: eqx.Module) -> dict[str, tuple[str, ...]]:
-    """Name -> path of every differentiable parameter; dotted in `extra`, and where the last word alone is ambiguous."""
+    """Path of each differentiable parameter by name; dotted in `extra`, and where the last word is ambiguous."""
     paths = [path for path, field in walk(module) if "parameter" in field.metadata]
     last = [path[-1] for path in paths if path[0] != EXTRA]
     return {(p[-1] if p[0] != EXTRA and last.count(p[-1]) == 1 else ".".join(p)): p for p in paths}
@@ -259,10 +255,8 @@ _BASES = {  # exponents of mass, length and time
 
 
 def unit_dimensions(unit: str) -> dict[str, float]:
-    """Exponents of mass, length and time in a unit such as `N s/m` or `N/m^(10/9)`.
-
-    **Raises:** `ValueError` for a unit that is not made of 1, rad, K, kg, m, s, N, Pa.
-    """
+    """Exponents of mass, length and time in a unit such as `N s/m` or `N/m^(10/9)`. **Raises:** `ValueError` for a unit
+    that is not made of 1, rad, K, kg, m, s, N, Pa."""
     above, _, below = unit.partition("/")
     total = [0.0, 0.0, 0.0]
     for sign, factors in ((1, above), (-1, below)):
@@ -283,19 +277,19 @@ def parameter_dimensions(module: eqx.Module) -> dict[str, dict[str, float]]:
 
 
 def choice_paths(module: eqx.Module) -> dict[str, tuple[str, ...]]:
-    """Dotted name -> path of every static choice and count, e.g. `film.model`."""
+    """Path of each static choice and count by dotted name, e.g. `film.model`."""
     found = [path for path, field in walk(module) if "parameter" not in field.metadata]
     return {".".join(path): path for path in found}
 
 
 def replace(module: M, **values: PyTree) -> M:
-    """A copy of `module` with named parts replaced.
+    """Copy of `module` with named parameters or parts replaced.
 
     **Arguments:** parameters by name in SI units, e.g. `replace(model, guidance_gap=0.5e-3)`; choices and counts by
     dotted name through a dictionary, `replace(model, **{"film.model": "positive_pressure"})`; and whole parts of the
     model, `replace(model, rib=ElasticRib(...))`, `replace(model, extra=(MyDrag(3.0),))`.
 
-    **Raises:** `ValueError` for a name the module does not have, or an option a choice does not offer.
+    **Raises:** `ValueError` for an unknown name, a value out of its range, or an option that a choice does not offer.
     """
     _require_module(module)
     paths, fields = parameter_paths(module) | choice_paths(module), dict(walk(module))
@@ -317,7 +311,7 @@ def replace(module: M, **values: PyTree) -> M:
 
 
 def _changed(module: Any, changes: Mapping[tuple[str, ...], Any]) -> Any:
-    """A copy of `module` with what is at these paths changed. Each part is checked once, with all of its changes."""
+    """Copy of `module` with the values at these paths replaced; each part is checked once, after all its changes."""
     parts: dict[str, Any] = {}
     for name in dict.fromkeys(path[0] for path in changes):
         whole = changes[(name,)] if (name,) in changes else _part(module, name)
@@ -338,23 +332,23 @@ def _changed(module: Any, changes: Mapping[tuple[str, ...], Any]) -> Any:
 
 
 def allowed(info: ParameterInfo) -> str:
-    """What a parameter must be, as every refusal of a number says it."""
+    """Allowed range of a parameter, as messages state it."""
     unit = "" if info.unit in ("1", UNKNOWN) else f" {info.unit}"
     return f"must be a number from {info.lower:g} to {info.upper:g}{unit}"
 
 
 ROUNDING = 1e-12
-"""Relative difference of numbers that are the same but for a conversion of units."""
+"""Relative tolerance for rounding in unit conversions."""
 
 
 def within(numbers: Any, lower: float, upper: float) -> np.ndarray:
-    """Whether numbers are from `lower` to `upper`; 10 um, converted, is a little less than 1e-5 m."""
+    """True for numbers from `lower` to `upper`, up to rounding: 10 um, converted, is a little less than 1e-5 m."""
     given = np.asarray(numbers, dtype=float)
     return np.asarray((given >= lower - ROUNDING * abs(lower)) & (given <= upper + ROUNDING * abs(upper)))
 
 
 def _require_range(name: str, value: Any, info: ParameterInfo) -> None:
-    """**Raises:** `ValueError` in the words of a configuration; what is still traced passes."""
+    """Require a value within its range; traced ones pass. **Raises:** `ValueError` otherwise."""
     if isinstance(value, _NO_NUMBERS):
         raise ArgumentError(name, said=f"{allowed(info)}, but {reprlib.repr(value)} was given.")
     if isinstance(value, Tracer) or not isinstance(value, int | float | np.ndarray | np.generic | jax.Array):
@@ -367,13 +361,13 @@ def _require_range(name: str, value: Any, info: ParameterInfo) -> None:
 
 
 Parameter = str | Callable[[Any], Any]
-"""A parameter by its name, or a function that picks it from a model."""
+"""Name of a parameter, or a function that picks it from a model."""
 
 
 def pick(model: Any, parameter: Parameter) -> Callable[[Any], Any]:
-    """The function that picks a parameter from a model.
+    """Function that picks a parameter from a model.
 
-    **Raises:** `ValueError` for a name that the model does not have, and for a function that picks no number of it.
+    **Raises:** `ValueError` for an unknown name, or a function that returns none of the model's numbers.
     """
     if callable(parameter):
         picked = parameter(model)
@@ -390,7 +384,7 @@ def pick(model: Any, parameter: Parameter) -> Callable[[Any], Any]:
 
 
 def _by_field_name(model: Any) -> dict[str, tuple[str, ...]]:
-    """Numbers of a user's own module by the last word of their path, dotted where that alone is ambiguous."""
+    """Paths of the numbers of a user's module by the last word, or by dotted name where that is ambiguous."""
     leaves, _ = jax.tree_util.tree_flatten_with_path(model)
     paths: list[tuple[str, ...]] = []
     for path, leaf in leaves:

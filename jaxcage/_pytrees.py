@@ -1,5 +1,4 @@
-"""Types of the arrays in public signatures (jaxtyping; checked at run time in the tests only), and pytrees taken apart
-into their arrays and the rest."""
+"""Array types of public signatures (jaxtyping, checked in the tests only); pytrees split into arrays and the rest."""
 
 import functools
 import gc
@@ -16,35 +15,33 @@ Scalar: TypeAlias = Float[Array, ""] | float | int
 """A real number: a zero-dimensional array (traced or not) or a Python number."""
 
 State: TypeAlias = tuple[Float[Array, "..."] | float | int, ...]
-"""Coordinates, velocities or a whole state as a tuple of scalars, so that lanes stay innermost under `vmap`; of a whole
-bearing two arrays, the state and the quantities beside it."""
+"""Coordinates, velocities or a whole state as a tuple of scalars, so that lanes stay innermost under `vmap`; for a
+whole bearing two arrays, the state and the quantities beside it."""
 
 ARRAYS = (jax.Array, np.ndarray, np.generic)
 
 
 class Form(NamedTuple):
-    """A pytree but for its arrays."""
+    """Structure of a pytree without its arrays."""
 
     tree: Any
     rest: tuple[Any, ...]
-    """Each leaf that is no array stands here with its type, since 1 equals True."""
+    """None for each array; other leaves with their types, since 1 equals True."""
 
     def filled(self, arrays: Sequence[Any]) -> Any:
-        """The tree with these arrays."""
         each = iter(arrays)
         return jax.tree.unflatten(self.tree, [next(each) if x is None else x[1] for x in self.rest])
 
 
 def split(tree: Any, taken: Callable[[Any], bool] = lambda x: isinstance(x, ARRAYS)) -> tuple[Form, list[Any]]:
-    """The form of a pytree, and its arrays, or those of its leaves that are `taken`."""
+    """Split a pytree into its form and its arrays, or those of its leaves that are `taken`."""
     leaves, shape = jax.tree.flatten(tree)
     rest = tuple(None if taken(x) else (type(x), x) for x in leaves)
     return Form(shape, rest), [x for x in leaves if taken(x)]
 
 
 def compiled(f: Callable[..., Any]) -> Callable[..., Any]:
-    """`equinox.filter_jit` without Python's garbage collection while it traces: that walks through all that is being
-    traced again and again, nearly half of the time that tracing takes."""
+    """`equinox.filter_jit` without garbage collection during calls, which takes nearly half of the tracing time."""
     jitted = eqx.filter_jit(f)
 
     @functools.wraps(f)

@@ -1,7 +1,7 @@
-"""Quantities that are reported: name, symbol, SI unit, words, and the unit in which people read them; results as HTML.
+"""Reported quantities: name, symbol, SI unit, description and display unit; results as HTML.
 
-They give the axes of figures, the attributes of data sets, the heads of tables and of CSV columns. A model declares
-those that it reports of its own (`AbstractForcedSystem.quantities`), with how each follows from averages over a run.
+They label the axes of figures, the variables of data sets and the columns of tables and CSV files. A model declares its
+own (`AbstractForcedSystem.quantities`), with the function that computes each from averages over a run.
 """
 
 import dataclasses
@@ -16,54 +16,51 @@ from jaxtyping import Float
 
 @dataclasses.dataclass(frozen=True)
 class Averages:
-    """Integrals and largest values over stretches of a run, by the names that the model gives them."""
+    """Integrals and maxima over intervals of a run, by the names that the model gives them."""
 
     integrals: Mapping[str, np.ndarray]
-    """Integrals over time, `time` itself among them [SI]."""
+    """Integrals over time [SI], including `time` itself."""
     largest: Mapping[str, np.ndarray]
     numbers: Mapping[str, np.ndarray]
-    """Numbers of each lane that quantities refer to, as the model's `reference` gives them."""
+    """Reference values of each lane, from the model's `reference`."""
     revolutions: float | int
-    """Length of a stretch in revolutions."""
+    """Length of an interval in revolutions."""
 
     def mean(self, name: str) -> np.ndarray:
-        """Mean over time."""
         return self.integrals[name] / self.integrals["time"]
 
     def per_revolution(self, name: str) -> np.ndarray:
-        """Integral over a revolution."""
         return self.integrals[name] / self.revolutions
 
 
 @dataclasses.dataclass(frozen=True)
 class Quantity:
-    """A reported quantity."""
+    """Reported quantity: name, symbol, SI unit and description."""
 
     name: str
     symbol: str
     unit: str
     text: str
     shown_in: str = ""
-    """Unit in which it is shown, where that is not the SI unit."""
+    """Display unit; empty for the SI unit."""
     of: Callable[[Any], Any] | None = None
-    """How it follows from `Averages`, or from what the model makes of a time history."""
+    """Function that computes it from `Averages`, or from the model's result for a time history."""
     overall: Literal["whole", "mean"] = "whole"
-    """Value of a run: that of the averages over the whole of it, or the mean of the values of its blocks."""
+    """Value of a run: from averages over the whole run, or the mean over its blocks."""
 
     @property
     def shown_unit(self) -> str:
-        """Unit on axes and in tables."""
         return self.shown_in or self.unit
 
     @property
     def label(self) -> str:
-        """Axis label with the unit it is shown in."""
+        """Axis label with the display unit."""
         unit = f" [{self.shown_unit}]" if self.shown_unit != "1" else ""
         return f"{self.text[:1].upper()}{self.text[1:]} {self.symbol}{unit}"
 
     @property
     def factor(self) -> float:
-        """Factor from the SI unit to the unit it is shown in."""
+        """Factor from the SI unit to `shown_unit`."""
         return _FACTORS[self.shown_in]
 
 
@@ -76,10 +73,10 @@ def averaged(
     numbers: Mapping[str, Float[np.ndarray, " lanes"]],
     block: float | int,
 ) -> list[tuple[Quantity, Float[np.ndarray, " lanes"], Float[np.ndarray, "lanes blocks"]]]:
-    """Each quantity with its value over the whole of a run and in each block of it.
+    """Each quantity with its value over a whole run and in each of its blocks.
 
-    **Arguments:** quantities; names of the integrals and of the largest values; both in each block; numbers of each
-    lane; revolutions of a block.
+    **Arguments:** quantities; names of the integrals and of the maxima; both per block; lanes' reference values;
+    revolutions per block.
     """
     named = lambda names, values: {name: values[..., i] for i, name in enumerate(names)}
     wide = {name: x[:, None] for name, x in numbers.items()}
@@ -131,7 +128,7 @@ GLOSSARY: dict[str, Quantity] = {quantity.name: quantity for quantity in _QUANTI
 
 
 def quantity(name: str) -> Quantity:
-    """The quantity `name`; a name that is not listed stands for itself, without a unit."""
+    """Quantity by name; a name that is not listed stands for itself, without a unit."""
     return GLOSSARY.get(name, Quantity(name, "", "1", name.replace("_", " ")))
 
 
@@ -142,14 +139,13 @@ _COMPONENTS = {
 
 
 def component_names(dimension: int) -> tuple[str, ...]:
-    """Names of the state components of a cage; those of another system are numbered."""
+    """Names of the state components of a cage; those of other systems are numbered."""
     return _COMPONENTS.get(dimension) or tuple(f"y{i}" for i in range(dimension))
 
 
 def notebook_html(self: Any) -> str:
-    """`str(self)` as HTML: the first line as the head, the others as rows, cut where the text leaves a gap or after a
-    colon. A class takes it as its method `_repr_html_`.
-    """
+    """`str(self)` as HTML: a heading, then rows split at gaps and after colons. Classes use it as method
+    `_repr_html_`."""
     head, *lines = str(self).splitlines() or [""]
     rows = [re.split(r"\s{2,}|(?<=:)\s", line.strip()) for line in lines]
     cells = [[f'<td style="text-align: left">{html.escape(cell)}</td>' for cell in row] for row in rows]

@@ -1,4 +1,4 @@
-"""The answer of a command: a sentence, tables and notes for people, a document for programs, files."""
+"""Answer of a command: a sentence, tables and notes for people, a document for programs, files."""
 
 import dataclasses
 import io
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from ..show import Table
 
 ENDINGS = {"report": ".html", "file": ".toml"}
-"""Ends of the names of files that are texts."""
+"""Extensions of text files, by key."""
 USUAL = ("figure", "data", "curve_data", *ENDINGS)
-"""Keys of files whose names do not hold the key."""
+"""Keys of files whose names do not contain the key."""
 PLAIN = str.maketrans({"±": "+-", "µ": "u", "°": "deg ", "²": "^2", "³": "^3", "–": "-"})
-"""Plain characters in place of others, where standard output cannot show these."""
+"""ASCII replacements for characters that standard output cannot show."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,26 +32,25 @@ class Answer:
     """Results of a command. The wrapper adds the case, the time, the files and the readings of the paper."""
 
     sentence: str
-    """The answer itself."""
     tables: Sequence["Table"] = ()
-    """The table that decides first. Those with a key stand in the document too."""
+    """Tables, the one that decides first; those with a key are also in the document."""
     notes: Sequence[str] = ()
     document: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """More for programs, in SI units unless a name ends in another one."""
+    """Further content of the JSON document, in SI units unless a name ends in another one."""
     files: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """Key in the document -> a figure, columns of numbers, a data set or a text; or the path of one already written."""
     details: Sequence[str] = ()
     """Notes that are printed on request only."""
     part: str = ""
-    """Addition to the name of the case in names of files."""
+    """Suffix of the case name in file names."""
     by_ranges: bool = False
-    """True if the values that are known within ranges only were not taken at their best guesses."""
+    """True if values known within ranges only were not taken at their best guesses."""
     failure: str = ""
-    """Sentence that is printed, with exit status 1, after the answer of something that failed."""
+    """Message printed after the answer if something failed; the exit status is then 1."""
 
 
 def complete(answer: Answer, command: str, subject: Subject, out: str, seconds: float) -> Answer:
-    """Write the files of an answer, and add what every command prints."""
+    """Write the files of an answer, and add the parts that every command prints."""
     stem = Path(out) / f"{command}_{subject.name}{answer.part}"
     written = {key: str(_written(key, content, stem, subject)) for key, content in answer.files.items()}
     document = {"case": subject.name, **{table.key: table.records for table in answer.tables if table.key}}
@@ -111,7 +110,7 @@ def print_answer(answer: Answer, as_json: bool, details: bool = False) -> None:
     try:
         print(text, flush=True)
     except OSError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or Python tries again at its end, and complains
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # otherwise Python tries again at exit, and complains
         raise OSError(
             f"Standard output could not be written ({error.strerror or error}): the files of this run are whole, make "
             "room and run it again for what it prints."
@@ -119,7 +118,7 @@ def print_answer(answer: Answer, as_json: bool, details: bool = False) -> None:
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON has it; numbers that are not finite become null."""
+    """Value in the types of JSON; numbers that are not finite become null."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return plain({field.name: getattr(value, field.name) for field in dataclasses.fields(value)})
     if isinstance(value, Mapping):

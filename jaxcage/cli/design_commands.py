@@ -1,4 +1,4 @@
-"""Commands about designs: better ones, tolerances, and values that are known within ranges only."""
+"""Commands on designs: optimisation, tolerances, and values known within ranges only."""
 
 import math
 from functools import partial
@@ -19,7 +19,7 @@ from .values import no_worse_balance, read_bounds, read_tolerances
 
 
 DESIGNED = o.Range(4000.0, 27500.0)
-"""Speeds at which designs of a cage are assessed; their number is 48 unless given."""
+"""Speeds at which designs of a cage are assessed, 48 of them by default."""
 Vary = Annotated[
     o.Texts,
     tyro.conf.arg(
@@ -55,14 +55,14 @@ def design(
     means: o.MeanOptions = o.MeanOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """The cheapest design of a cage that is calm over an --operating range, with margins, by exact gradients.
+    """Cheapest design of a cage that is calm over an --operating range, with margins, by exact gradients.
 
-    Without that range fewer speeds are made chaotic, and of a bearing wear, forces and losses small, by a search on
-    simulations whose best design is compared with the given one by runs that the search has not used.
+    Without that range: a search on simulations for fewer chaotic speeds or, for a bearing, less wear, forces and
+    losses; its best design is compared with the given one by independent runs.
 
     Args:
-        cost: Price of a unit of manufacturing cost of a cage [rpm of chaotic speeds]; 1000 if left out.
-        wear: For a bearing: weight of the wear over its present value; 1 if left out, as all weights are.
+        cost: Price of a unit of manufacturing cost of a cage [rpm of chaotic speeds]; by default 1000.
+        wear: For a bearing: weight of the wear over its present value; by default 1, as for all weights.
         force: For a bearing: weight of the peak forces on pockets and land.
         impulse: For a bearing: weight of the impulses of pockets and land.
         power: For a bearing: weight of the power lost.
@@ -70,9 +70,9 @@ def design(
         balance: For a bearing: weight of the balance grade of its cage.
         worse_balance: Let the cage be balanced worse than it is.
         search: Search for a design: slsqp or augmented with --operating, else surrogate, on simulations.
-        searches: With --operating: searches, the first from the design itself.
-        steps: For surrogate: steps of the search; 10 if left out, of a bearing 12.
-        batch: For surrogate: designs of a step; 12 if left out, of a bearing 16.
+        searches: With --operating: number of searches, the first from the design itself.
+        steps: For surrogate: steps of the search; by default 10, for a bearing 12.
+        batch: For surrogate: designs of a step; by default 12, for a bearing 16.
     """
     d, model, bounds = jc.design, subject.model, read_bounds(vary, subject)
     notes = [] if worse_balance else no_worse_balance(model, bounds)
@@ -126,7 +126,7 @@ def design(
 
 
 def _runs(subject: Subject, over: o.Range, means: o.MeanOptions, seed: int, progress: Any = None) -> Any:
-    """Runs of designs, of a cage at speeds over a range."""
+    """Settings of the runs of designs; for a cage, over a range of speeds."""
     if subject.with_rollers:
         length = means.length(initial_states=4, discard=10, revolutions=20)
         return jc.design.Runs.of_bearing(subject.speed(means.speed), **length, seed=seed, progress=progress)
@@ -139,7 +139,7 @@ def _runs(subject: Subject, over: o.Range, means: o.MeanOptions, seed: int, prog
 def _calm_design(
     subject: Subject, bounds: dict[str, Any], calm: o.CalmOptions, notes: list[str], **searches: Any
 ) -> Answer:
-    """The design of a cage for calm operation over a range of speed."""
+    """Answer on the design of a cage for calm operation over a range of speed."""
     model, name = subject.model, subject.name
     low, high = subject.operating(calm.operating or "")
     film = None if calm.least_film is None else jc.files.to_si(calm.least_film, "m")
@@ -190,14 +190,14 @@ def sensitivity(
     means: o.MeanOptions = o.MeanOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Shares of each parameter in the chaotic speeds over its range, and effect of tolerances on the exact edges.
+    """Variance of the chaotic speeds due to each parameter over its range, and effect of tolerances on the exact edges.
 
-    A bearing with its rollers gives the same for a measure at one speed, such as its wear.
+    For a bearing with its rollers: the same for a measure at one speed, such as its wear.
 
     Args:
         of: For a bearing: measure, such as wear, power, slip or pocket_force_peak_N.
-        samples: Base samples of the Sobol indices, a power of 2; 64 if left out, of a bearing 32.
-        tolerance: Tolerance of every parameter but constants, ± so many percent, uniformly distributed.
+        samples: Base samples of the Sobol indices, a power of 2; by default 64, for a bearing 32.
+        tolerance: Tolerance of every parameter but constants, ± per cent, uniformly distributed.
     """
     d, model, name, bounds, files = jc.design, subject.model, subject.name, read_bounds(vary, subject), {}
     if of not in d.BEARING_MEASURES:
@@ -240,7 +240,7 @@ def sensitivity(
 
 
 def _not_fixed(model: Any, names: Any) -> list[str]:
-    """Parameters that have a tolerance: all but definitions, units and constants of nature and of the numerics."""
+    """Parameters that have a tolerance: all but constants of nature, of a law, or numerical."""
     info = jc.parameter_info(model)
     return [n for n in names if info[n].kind != "fixed" or n.startswith("extra.")]
 
@@ -255,13 +255,13 @@ def identify(
     steps: o.StepOptions = o.StepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Narrow the ranges of a TOML file by what was measured on the machine, and write them to a new file.
+    """Narrow the ranges of a TOML file by measurements on the machine, and write them to a new file.
 
     Args:
         measured: Measurements: a file with the columns quantity, speed, value, tolerance; a quantity is
             `whirl frequency` [Hz], `orbit size` [mm], or without a value `rattles` or `calm`.
-        draws: Draws from the ranges, in each stage.
-        stages: Times that the ranges close around the best draws, at most.
+        draws: Number of draws from the ranges in each stage.
+        stages: Largest number of times that the ranges close around the best draws.
     """
     model, unknowns = subject.model, subject.unknowns
     if not unknowns:

@@ -1,4 +1,4 @@
-"""Types of options, and the groups of options that commands share; nothing heavy is imported here."""
+"""Types of options, and groups of options that commands share; nothing heavy is imported here."""
 
 import contextlib
 import dataclasses
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 
 
 MOST = 10_000_000
-"""Largest count: more lanes, speeds or revolutions end in no memory, or in no lifetime."""
+"""Largest count; more lanes, speeds or revolutions exceed memory or never finish."""
 LARGEST = {"rpm": 1e6, "N": 1e7}
 """Largest speed and load."""
 SIDE = range(2, 10_001)
-"""Points along one side of a map."""
+"""Allowed numbers of points along one side of a map."""
 EXAMPLES = {"rpm": '"900 rad/s" or "20000 rpm shaft"', "N": '"4.45 kN"'}
 
 
 def flag(name: str) -> str:
-    """An option as it is written."""
+    """Name of an option as it is written on the command line."""
     return "--" + name.replace("_", "-")
 
 
@@ -38,7 +38,7 @@ def text(
     read: Callable[[str], Any] = str,
     metavar: str = "NAME",
 ) -> Any:
-    """An option that is a text for which `holds` is true, as `read` makes of it."""
+    """Option that takes a text for which `holds` is true, and converts it with `read`."""
 
     def checked(given: list[str]) -> Any:
         if not holds(given[0]):
@@ -56,10 +56,8 @@ def text(
 
 
 def read_quantity(given: str, unit: str) -> float:
-    """The number in a text, in `unit`, which a bare number has already; a speed may say whose it is.
-
-    **Raises:** `ValueError` with the words that follow the option's name.
-    """
+    """Read a number in `unit` unless it names its own; a speed may say whether it is the shaft's or the cage's.
+    **Raises:** `ValueError` whose message follows the option's name."""
     with contextlib.suppress(ValueError):
         return float(given)
     if not unit:
@@ -74,7 +72,7 @@ def read_quantity(given: str, unit: str) -> float:
 
 
 def number(must: str = "be finite", holds: Callable[[float], bool] = math.isfinite, unit: str = "") -> Any:
-    """An option that is a number, in `unit` or with a unit of its own, for which `holds` is true."""
+    """Option that takes a number, in `unit` or with its own unit, for which `holds` is true."""
     most = LARGEST.get(unit, math.inf)
 
     def read(given: str) -> float:
@@ -88,13 +86,13 @@ def number(must: str = "be finite", holds: Callable[[float], bool] = math.isfini
 
 
 def count(least: int) -> Any:
-    """An option that is a whole number of at least `least`."""
+    """Option that takes a whole number of at least `least`."""
     fits = lambda given: given.strip().lstrip("+").isdecimal() and len(given) < 9 and int(given) >= least
     return text(f"be an integer of at least {least} and at most {MOST}", fits, int, "INT")
 
 
 def pair(sign: str, must: str, holds: Callable[[int, int], bool]) -> Any:
-    """An option of two counts with a sign between them, for which `holds` is true."""
+    """Option that takes two counts with `sign` between them, for which `holds` is true."""
     split = lambda given: tuple(int(part) for part in given.lower().split(sign))
     form = re.compile(rf"\d{{1,5}}{sign}\d{{1,5}}", re.IGNORECASE)
     return text(must, lambda given: form.fullmatch(given) is not None and holds(*split(given)), split)
@@ -110,7 +108,7 @@ _CASE = "A published case (1a, 1b, 2a, 2b, 3a, 3b), a bearing with its rollers (
 
 if TYPE_CHECKING:
     Case = Other = Subject
-else:  # a text that the wrapper reads before it runs the command
+else:  # a text, which the wrapper replaces by the subject before it runs the command
     Case = Annotated[tyro.conf.Positional[Any], text(metavar="CASE"), arg(help=_CASE)]
     Other = Annotated[tyro.conf.Positional[Any], text(metavar="OTHER"), arg(help="The design to compare it with.")]
 Speed = Annotated[float, _SPEED, arg(help=f'Speed, e.g. "900 rad/s" or "20000 rpm shaft". {_OWN}.')]
@@ -135,7 +133,8 @@ class Range:
     """Range of speed."""
 
     first: Annotated[float, _SPEED] = 2500.0
-    """Lowest speed, e.g. "300 rad/s" or "6000 rpm shaft"; bare numbers as in the description of CASE."""
+    """Lowest speed, e.g. "300 rad/s" or "6000 rpm shaft"; bare numbers are in rpm of the cage or, for a bearing with
+    its rollers or a file that says so, of the shaft."""
     last: Annotated[float, _SPEED] = 27500.0
     """Highest speed."""
     count: OptionalCount = None
@@ -149,13 +148,13 @@ class StepOptions:
     solver: OptionalText = None
     """Integration method: rk4, rodas4, tsit5."""
     steps: OptionalCount = None
-    """Equal steps per revolution."""
+    """Number of equal steps per revolution."""
     tolerance: Annotated[float | None, number()] = None
-    """Adaptive steps with this tolerance."""
+    """Tolerance of adaptive steps."""
 
     @property
     def method(self) -> Any:
-        """The integration method that is asked for; None leaves the choice to what is computed."""
+        """Integration method of these options; None leaves the choice to the computation."""
         given = _given(solver=self.solver, steps=self.steps, tolerance=self.tolerance)
         if not given:
             return None
@@ -169,13 +168,13 @@ class RunOptions(StepOptions):
     """Options of the length of a run."""
 
     discard: OptionalZero = None
-    """Revolutions left out at the beginning."""
+    """Revolutions discarded at the beginning."""
     revolutions: OptionalCount = None
     """Revolutions observed."""
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Settings of `jaxcage.lanes.Run` that are given; the model has defaults of its own for the others."""
+        """Settings of `jaxcage.lanes.Run` that are given; the model has defaults for the others."""
         blocks = None if self.revolutions is None else blocks_of(self.revolutions)
         return _given(discard=self.discard, revolutions=self.revolutions, method=self.method, blocks=blocks)
 
@@ -185,9 +184,9 @@ class SweepOptions(RunOptions):
     """Options of the length of a sweep and of the certainty of its labels."""
 
     horizon: OptionalZero = None
-    """Revolutions to which chaos is followed, to tell how long it lasts; 0 turns this off."""
+    """Revolutions up to which chaotic trajectories are continued, to see how long chaos lasts; 0 turns this off."""
     no_confirm: bool = False
-    """Do not run lanes that are not periodic again by finer steps."""
+    """Do not repeat trajectories that are not periodic with finer steps."""
     exponents: OptionalCount = None
     """Number of Lyapunov exponents."""
 
@@ -199,52 +198,52 @@ class SweepOptions(RunOptions):
 
 @dataclasses.dataclass(frozen=True)
 class MeanOptions:
-    """Runs at one speed, of a bearing with its rollers."""
+    """Runs at one speed of a bearing with its rollers."""
 
     speed: Annotated[float | None, _SPEED] = None
-    """The speed, e.g. "10000 rpm shaft"."""
+    """Speed, e.g. "10000 rpm shaft"."""
     load: Load = None
     initial_states: OptionalCount = None
     """Initial states of each design."""
     discard: OptionalZero = None
-    """Revolutions left out at the beginning."""
+    """Revolutions discarded at the beginning."""
     revolutions: OptionalCount = None
     """Revolutions observed, an even number."""
 
     def length(self, **usual: int) -> dict[str, int]:
-        """Initial states and revolutions as given, or else the usual ones."""
+        """Number of initial states and revolutions as given, or else the usual ones."""
         return usual | _given(**{name: getattr(self, name) for name in usual})
 
 
 @dataclasses.dataclass(frozen=True)
 class CalmOptions:
-    """Requirements that a design of a cage must keep over an operating range."""
+    """Requirements on the design of a cage over an operating range."""
 
     operating: OptionalText = None
-    """Range of speed in which the machine runs, e.g. "31500-44000 rpm shaft"."""
+    """Operating range of speed, e.g. "31500-44000 rpm shaft"."""
     objective: Annotated[str, text("be cost or width", lambda x: x in ("cost", "width"))] = "cost"
     """The quantity to minimise: cost, or the exact width of the unstable ranges within --operating."""
     margin: Annotated[float, number("be at least 0 and below 50", lambda x: 0 <= x < 50)] = 10.0
     """Least distance of both ends of the range from the edges of the stable range, per cent of speed."""
     decay: Annotated[float | None, _ABOVE] = None
-    """Most revolutions in which a small disturbance falls to 1/e."""
+    """Largest number of revolutions in which a small disturbance falls to 1/e."""
     least_film: OptionalText = None
     """Least distance of cage and land, e.g. "20 um"."""
     land_force: Annotated[float | None, _NOT_NEGATIVE] = None
-    """Largest force of the land on the cage in calm motion [N]; 0: they do not touch."""
+    """Largest force of the land on the cage in calm motion [N]; 0 forbids contact."""
     grade: Annotated[float | None, _ABOVE] = None
     """Largest balance grade G [mm/s]."""
     drag: Annotated[float | None, _ABOVE] = None
-    """Largest power to shear the film [W]."""
+    """Largest power lost by shear of the film [W]."""
     tolerance: OptionalText = None
     """Tolerances within which all of this must hold, e.g. "guidance_gap=+-0.05 mm, eccentricity=G6.3"."""
     check: FromZero = 16
-    """Initial states from which the result is simulated over the range; 0 leaves it out."""
+    """Initial states from which the result is simulated over the range as a check; 0 leaves it out."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ShowOptions:
-    """Options of output."""
+    """Output options."""
 
     out: Annotated[str, text("name a folder")] = "out"
     """Folder for figures and data; it is made if need be."""
@@ -253,19 +252,17 @@ class ShowOptions:
     json: bool = False
     """Print one JSON document on standard output instead of tables."""
     no_cache: bool = False
-    """Compile everything anew instead of using programs of earlier runs."""
+    """Compile everything again instead of using cached programs of earlier runs."""
 
 
 def _given(**options: Any) -> dict[str, Any]:
-    """Options that are given."""
+    """Options that are not None."""
     return {name: value for name, value in options.items() if value is not None}
 
 
 def blocks_of(revolutions: int) -> int:
-    """Number of equal blocks of the observed revolutions, from which error bars come.
-
-    **Raises:** `ValueError` for revolutions that cannot be cut.
-    """
+    """Number of equal blocks of the observed revolutions, for error bars. **Raises:** `ArgumentError` if they cannot be
+    divided."""
     if revolutions % 10 == 0:
         return 10 if revolutions % 20 else 20
     if (found := max(n for n in range(1, 21) if revolutions % n == 0)) == 1:

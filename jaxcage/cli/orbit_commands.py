@@ -1,4 +1,4 @@
-"""Commands about periodic orbits and what bounds them: zones, bifurcations, gradients, maps."""
+"""Commands on periodic orbits and their stability boundaries: zones, bifurcations, gradients, maps."""
 
 import dataclasses
 from functools import partial
@@ -27,9 +27,9 @@ def zones(
     run: o.SweepOptions = o.SweepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Chaotic zones beside the zones without a stable synchronous orbit, with exact edges and their gradients.
+    """Chaotic zones beside the unstable ranges of the synchronous orbit, with exact edges and their gradients.
 
-    A bearing with its rollers gives stretches of speed with the same motion, a file with ranges chances of chaos.
+    For a bearing with its rollers: ranges of speed with the same motion. For a file with ranges: chances of chaos.
     """
     if subject.unknowns and draws:
         return chances(subject, over, draws, seed, run)
@@ -44,8 +44,8 @@ def zones(
 def explained(
     subject: Subject, found: Any, orbits: Any, answer: Answer, quick: bool, method: Any
 ) -> tuple[Answer, Any, dict[str, Any]]:
-    """The answer about a sweep with the mechanisms of its zones and the zones without a stable synchronous orbit; the
-    chaotic zones; and the sensitivities of exact edges."""
+    """Answer on a sweep with the mechanisms of its zones and unstable ranges; chaotic zones; sensitivities of exact
+    edges."""
     name, beside, loss = subject.name, subject.beside, jc.unstable_ranges(orbits)
     known = jc.orbits.explain(jc.zones(found), orbits, subject.model, method)
     slopes = {} if quick else jc.show.edge_slopes(subject.model, loss, known, method)
@@ -60,10 +60,8 @@ def explained(
 
 
 def _searched(subject: Subject, over: o.Range, discard: int | None, method: Any, purpose: str = "") -> tuple[Any, Any]:
-    """The synchronous orbits over speed, and the zones without a stable one.
-
-    **Raises:** `NoResult` if there are none, and for a `purpose` of edges if there are no edges.
-    """
+    """Synchronous orbits over speed, and their unstable ranges. **Raises:** `NoResult` if there are none, or no edges
+    although the `purpose` needs some."""
     length: dict[str, Any] = {name: x for name, x in (("count", over.count), ("discard", discard)) if x is not None}
     told = {"method": method, "progress": report}
     found = jc.orbits.synchronous_orbits(subject.model, *subject.ends(over), **length, **told)
@@ -86,17 +84,17 @@ def bifurcations(
     steps: o.StepOptions = o.StepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Synchronous orbits over speed: where they are stable, how they lose it, and the zones without one.
+    """Synchronous orbits over speed: their stable ranges, bifurcations and unstable ranges.
 
     Args:
-        discard: Revolutions of the simulations that are left out at the beginning.
+        discard: Revolutions of the simulations that are discarded at the beginning.
     """
     subject.require_orbits("bifurcations")
     return of_orbits(subject, *_searched(subject, over, discard, steps.method))
 
 
 def of_orbits(subject: Subject, found: Any, loss: Any) -> Answer:
-    """The answer about synchronous orbits over speed, of which there are some."""
+    """Answer on synchronous orbits over speed, at least one of which was found."""
     name, beside = subject.name, subject.beside
     main = found.branches[0 if loss.principal is None else loss.principal.branch]
     orbits = partial(jc.show.orbit_diagram_with_branches, found.sweep, found.branches)
@@ -136,16 +134,16 @@ def gradient(
     steps: o.StepOptions = o.StepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Derivatives by every parameter: of the edges of the synchronous orbit and of the widths of zones.
+    """Derivatives by every parameter: of the edges and widths of unstable ranges of the synchronous orbit.
 
-    With --lasting of zones of lasting chaos, and of a bearing with its rollers of means at one --speed, such as slip,
-    wear and power. Those have standard errors.
+    With --lasting: of zones of lasting chaos. For a bearing with its rollers: of means at one --speed, such as slip,
+    wear and power. Both have standard errors.
 
     Args:
-        lasting: Differentiate zones of chaos that lasts, by survival regression (minutes).
+        lasting: Differentiate zones of lasting chaos, by survival regression (minutes).
         zone: With --lasting: number of the zone, as `jaxcage sweep` counts them; 0 takes all.
-        by: With --lasting or --speed: parameters, of which several joined by + change together.
-        designs: With --lasting or --speed: designs around this one from which slopes are estimated.
+        by: With --lasting or --speed: parameters; those joined by + change together.
+        designs: With --lasting or --speed: number of designs around this one from which slopes are estimated.
         chaos: With --speed: the mean slope of the largest Lyapunov exponent as well.
     """
     model, method, name = subject.model, steps.method, subject.name
@@ -181,7 +179,7 @@ def gradient(
 
 
 def bars(subject: Subject, slopes: list[Any]) -> Any:
-    """The figure of the elasticities of edges or widths."""
+    """Figure of the elasticities of edges or widths."""
     draw = partial(jc.show.elasticity_bars, jc.show.to_be_turned(subject.model, slopes))
     return jc.show.drawn(draw, 9.0, 2.2 + 1.2 * len(slopes), f"{subject.name}: elasticities of the edges")
 
@@ -260,16 +258,16 @@ def map_(
     run: o.RunOptions = o.RunOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Stability map over speed and a parameter: labels, the largest exponent, what the model reports, edges on top.
+    """Stability map over speed and a parameter: labels, largest exponent, reported quantities, edges on top.
 
     Args:
-        y: The parameter; guidance_gap if left out, of a bearing with its rollers its load.
-        lower: Lowest value of y, in SI units or with a unit, e.g. "0.4 mm"; 0.8 of its value if left out.
-        upper: Highest value of y; 1.25 of its value if left out.
-        points: Grid of points at which lanes are run, e.g. 300x300.
+        y: Parameter; by default guidance_gap, for a bearing with its rollers its load.
+        lower: Lowest value of y, in SI units or with a unit, e.g. "0.4 mm"; by default 0.8 of its value.
+        upper: Highest value of y; by default 1.25 of its value.
+        points: Grid of simulated points, e.g. 300x300.
         initial_states: Initial states at each point.
         persist: Revolutions that chaos must outlast to count.
-        no_points: Follow the edges of the synchronous orbit only.
+        no_points: Only follow the edges of the synchronous orbit.
         no_curves: Do not follow the edges of the synchronous orbit.
     """
     model, y = subject.model, y or subject.usual("guidance_gap", "load")
@@ -310,7 +308,7 @@ def mapped(
     refused: dict[str, str],
     settings: dict[str, Any],
 ) -> Answer:
-    """The answer about a map over speeds [rad/s] and a parameter: lanes at points, if any, and edges followed."""
+    """Answer on a map over speeds [rad/s] and a parameter: simulated points, if any, and edges."""
     low, high = ends
     found, said, files, tables, y = None, [], {}, [], axis.name
     title = f"{subject.name} over speed and {y}"

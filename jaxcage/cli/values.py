@@ -1,4 +1,4 @@
-"""`NAME=VALUES` of options read into numbers: a grid, single values, an interval, a tolerance, with units."""
+"""Reading of `NAME=VALUES` options into numbers: grids, single values, intervals and tolerances, with units."""
 
 import itertools
 import re
@@ -17,19 +17,16 @@ from .subject import Subject
 SPEED, OIL = "speed", "oil"
 FORMS = "values such as 4000rpm:27500rpm:100, 0.3mm:0.6mm, 20um±3um or 32,56,78"
 MOST_CORNERS = 256
-"""Combinations of smallest and largest values that are checked beforehand."""
+"""Largest number of combinations of smallest and largest values that are checked beforehand."""
 USUAL = {"guidance_gap": (0.7, 1.4), "eccentricity": (0.2, 2.5)}
-"""Parameters that are varied if none is named, and the bounds as parts of their values."""
+"""Parameters that are varied by default, and their bounds relative to the present values."""
 WITH_ROLLERS = {"pocket_clearance": (0.7, 1.4), "land_width": (0.7, 1.4)}
-"""The same of a bearing with its rollers, beside those of a cage."""
+"""Further defaults for a bearing with its rollers."""
 GRADE = re.compile(r"G\s*(\d+(?:\.\d*)?)", re.IGNORECASE)
 
 
 def read_vary(given: Sequence[str], subject: Subject) -> dict[str, Any]:
-    """Every `NAME=VALUES`, in SI units: an array, or how to sample.
-
-    **Raises:** `InputError`.
-    """
+    """Read every `NAME=VALUES` in SI units: an array, or a range to sample from. **Raises:** `InputError`."""
     found = _read_each("--vary", given, f"NAME=VALUES with {FORMS}", lambda name, text: _read(name, text, subject))
     if SPEED not in found:
         raise InputError("Option --vary must be given for the speed too, e.g. --vary speed=12000rpm.")
@@ -38,10 +35,7 @@ def read_vary(given: Sequence[str], subject: Subject) -> dict[str, Any]:
 
 
 def read_bounds(given: Sequence[str], subject: Subject) -> dict[str, tuple[float, float]]:
-    """Every `NAME=LOWER:UPPER` of parameters to be chosen, in SI units; the usual ones if nothing is given.
-
-    **Raises:** `InputError`.
-    """
+    """Read every `NAME=LOWER:UPPER` in SI units; the usual ones if nothing is given. **Raises:** `InputError`."""
     model, names = subject.model, subject.usual((), jc.design.CAGE_PARAMETERS)
     if not given:
         usual, now = USUAL | subject.usual({}, WITH_ROLLERS), jc.parameters(model)
@@ -62,10 +56,8 @@ def read_bounds(given: Sequence[str], subject: Subject) -> dict[str, tuple[float
 
 
 def no_worse_balance(model: Any, vary: dict[str, tuple[float, float]]) -> list[str]:
-    """Lower the upper bound of the eccentricity to its present value. **Returns:** a note about it.
-
-    **Raises:** `InputError` for bounds that do not let it become smaller.
-    """
+    """Lower the upper bound of the eccentricity to its present value, and return a note if this changes it. **Raises:**
+    `InputError` for bounds that do not let it become smaller."""
     (lower, upper), own = vary.get("eccentricity", (0.0, 0.0)), float(model.eccentricity)
     if upper <= own:
         return []
@@ -79,10 +71,8 @@ def no_worse_balance(model: Any, vary: dict[str, tuple[float, float]]) -> list[s
 
 
 def read_tolerances(text: str, subject: Subject, fastest: float) -> dict[str, Any]:
-    """`NAME=±X, NAME=G6.3, ...` in SI units; a grade is that at the largest cage speed [rad/s].
-
-    **Raises:** `InputError`.
-    """
+    """Read `NAME=±X, NAME=G6.3, ...` in SI units; a grade refers to the `fastest` cage speed [rad/s]. **Raises:**
+    `InputError`."""
     info, now = jc.parameter_info(subject.model), jc.parameters(subject.model)
 
     def read(name: str, words: str) -> Any:
@@ -106,7 +96,7 @@ def read_tolerances(text: str, subject: Subject, fastest: float) -> dict[str, An
 
 
 def _read_each(option: str, given: Sequence[str], form: str, read: Callable[[str, str], Any]) -> dict[str, Any]:
-    """Read every `NAME=VALUES` by `read`, whose `ValueError` becomes a sentence about that name."""
+    """Read every `NAME=VALUES` with `read`, whose `ValueError` becomes a sentence about that name."""
     found: dict[str, Any] = {}
     for text in given:
         name, _, values = (part.strip() for part in text.replace("+-", "±").partition("="))
@@ -157,7 +147,7 @@ def _read(name: str, text: str, subject: Subject) -> Any:
 
 
 def _check_corners(vary: dict[str, Any], subject: Subject) -> None:
-    """Check the smallest and largest values of all that is varied, and that they go together."""
+    """Check that the smallest and largest values of all varied parameters are allowed together."""
     ends = {name: (how.min(), how.max()) if isinstance(how, np.ndarray) else how.bounds for name, how in vary.items()}
     ends.pop(SPEED, None)
     for values in itertools.islice(itertools.product(*ends.values()), MOST_CORNERS):

@@ -1,4 +1,4 @@
-"""The wrapper of all commands: it reads the options, runs a command, and turns what goes wrong into a sentence."""
+"""Entry point of all commands: it reads the options, runs a command, and turns errors into one sentence."""
 
 import contextlib
 import dataclasses
@@ -48,21 +48,20 @@ COMMANDS = {function.__name__.rstrip("_"): function for function in FUNCTIONS}
 CALLED = {"directions": "by", "lanes": "chunk", "samples": "sample", "settle": "discard", "confirm": "no_confirm"}
 CALLED |= {"method": "solver", "centrifugal_force": "shaft_speed", "blocks": "revolutions", "store": "out"}
 CALLED |= {"x": "points", "y": "points"}
-"""Argument of the library -> option that it comes from, where no option has its name."""
+"""Option that sets an argument of the library, where it has another name."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with `arguments`, by default those of the process.
 
-    **Returns:** exit status: 0, 1 for a computation without a result, 2 for bad input, 130 when
-    interrupted, 143 when told to end.
+    **Returns:** exit status: 0, 1 for no result, 2 for bad input, 130 when interrupted, 143 when terminated.
     """
     if arguments is None:  # the process is ours, not a notebook's
-        for name in ("stdout", "stderr"):  # one that was started without them writes to the null device
+        for name in ("stdout", "stderr"):  # a process without them writes to the null device
             if getattr(sys, name) is None:
                 setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
         end_at_once_when_interrupted()
-        gc.set_threshold(200_000, 50, 100)  # looking for dead objects takes a tenth of the time otherwise
+        gc.set_threshold(200_000, 50, 100)  # garbage collection takes a tenth of the time otherwise
     try:
         call = _parse(sys.argv[1:] if arguments is None else list(arguments))
         if call is not None:
@@ -84,8 +83,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(call: functools.partial[Answer]) -> None:
     """Read the case, run a command on it, write its files, and print its answer."""
-    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA writes pages about each program that it finds compiled
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells where it stores fonts if there is no home folder
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA logs pages about every cached program
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it reports its font cache if there is no home folder
     import jax
 
     jax.config.update("jax_enable_x64", True)
@@ -109,7 +108,7 @@ def _run(call: functools.partial[Answer]) -> None:
 
 
 def _of_a_case(call: functools.partial[Answer], show: ShowOptions) -> Answer:
-    """The answer of a command about a case, with its files; nothing is computed that cannot be written."""
+    """Answer of a command about a case, with its files; whether they can be written is checked first."""
     from ..files import check_writable
 
     began, command, given = time.perf_counter(), call.func.__name__.rstrip("_"), call.keywords
@@ -124,10 +123,8 @@ def _of_a_case(call: functools.partial[Answer], show: ShowOptions) -> Answer:
 
 
 def _about_options(error: ArgumentError, call: functools.partial[Answer]) -> Exception:
-    """A sentence about arguments of the library as one about the options that they come from.
-
-    An argument that comes from none is a mistake of ours.
-    """
+    """Error about options, from one about arguments of the library; a `RuntimeError`, for a bug, if no option sets
+    them."""
     options = {*call.keywords}
     for group in filter(dataclasses.is_dataclass, call.keywords.values()):
         options |= {field.name for field in dataclasses.fields(group)}  # pyright: ignore[reportArgumentType]
@@ -138,7 +135,7 @@ def _about_options(error: ArgumentError, call: functools.partial[Answer]) -> Exc
 
 
 def _later(command: Callable[..., Answer]) -> Callable[..., functools.partial[Answer]]:
-    """The command with its options bound, to be run after they have been read."""
+    """Command with its options bound, to be run after all have been read."""
 
     @functools.wraps(command)
     def bind(*args: Any, **kwargs: Any) -> functools.partial[Answer]:
@@ -150,10 +147,7 @@ def _later(command: Callable[..., Answer]) -> Callable[..., functools.partial[An
 
 
 def _parse(arguments: list[str]) -> functools.partial[Answer] | None:
-    """The command with its options, or None if help or the version was asked for and given.
-
-    **Raises:** `InputError`.
-    """
+    """Command with its options, or None after help or the version was printed. **Raises:** `InputError`."""
     import tyro
 
     if arguments == ["--version"]:
@@ -176,10 +170,9 @@ def _parse(arguments: list[str]) -> functools.partial[Answer] | None:
 
 
 def _sentence(box: str) -> str:
-    """The text of a box of tyro's as one sentence.
+    """Text of an error box of tyro as one sentence.
 
-    Its parts stand between rules, and the title in the upper border, or above a rule where the terminal has no line
-    drawing.
+    Parts are separated by rules; the title is in the upper border, or above a rule where there is no line drawing.
     """
     lines = [line.strip(" │") for line in box.splitlines()]
     is_rule = lambda line: not line.strip("─-╭╮╰╯") or line[0] == "╭"

@@ -1,4 +1,4 @@
-"""Designs: calm operation by exact gradients; statistics of runs, slopes, shares of variance, unknown values.
+"""Designs: calm operation by exact gradients; statistics, sensitivities, Sobol indices, unknown parameters.
 
 | module          | responsibility                                                                     |
 |-----------------|------------------------------------------------------------------------------------|
@@ -7,13 +7,13 @@
 | `operating`     | edges and orbits of an operating range, with exact derivatives by the design       |
 | `optimiser`     | the cheapest design that keeps its requirements over an operating range            |
 | `check`         | simulations of a design from many initial states                                   |
-| `statistics`    | chaotic speeds, quantities, loads of designs, read off one sweep; designs compared |
+| `statistics`    | chaotic speeds, quantities and loads of designs from one sweep; comparisons        |
 | `loads`         | loads of the guiding land, size and whirl of the motion                            |
-| `slopes`        | slopes of statistics by paired designs; tolerance budgets                          |
+| `slopes`        | derivatives of statistics by paired designs; tolerance budgets                     |
 | `survival_edges`| edges of lasting chaos with slopes by survival regression; widths of zones         |
 | `variance`      | Sobol indices                                                                      |
 | `surrogate`     | search for a better design by a Gaussian process                                   |
-| `unknowns`      | chances of chaos of a cage known within ranges; ranges narrowed by measurements    |
+| `unknowns`      | chances of chaos with unknown parameters; ranges narrowed by measurements          |
 | `verdict`       | whether a cage is calm over an operating range, its margins, what to change first  |
 """
 

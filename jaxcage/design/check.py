@@ -1,4 +1,4 @@
-"""A design is checked before it is believed: simulated from many initial states over its operating range."""
+"""Check of a design by simulations from many initial states over its operating range."""
 
 import dataclasses
 import json
@@ -13,14 +13,13 @@ from ..models import AbstractForcedSystem
 from .statistics import drawn_states
 
 
-SPEEDS = 24  # of the check
+SPEEDS = 24  # simulated over the operating range
 
 
 @dataclasses.dataclass(frozen=True)
 class Checked:
-    """Where simulations of a design ended, over speeds [rpm] of its operating range: shares of the lanes by label, the
-    speeds at which chaos coexists with the calm orbit, and how many revolutions it lasts there in the mean, infinite
-    where none ended."""
+    """Results of simulations of a design over speeds [rpm] of its operating range: shares of the trajectories by label,
+    the speeds at which some are chaotic, and the mean life of chaos there [revolutions], infinite where none ended."""
 
     speeds_rpm: Float[np.ndarray, " speeds"]
     initial_states: int
@@ -32,7 +31,7 @@ class Checked:
 
     @property
     def calm(self) -> bool:
-        """Whether all lanes ended on a period-1 orbit."""
+        """True if every trajectory ended on a period-1 orbit."""
         return self.shares.get("periodic-1") == 1.0
 
     def __str__(self) -> str:
@@ -53,10 +52,10 @@ def check_design(
     initial_states: int = 16,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Checked:
-    """Simulate a design from its own initial states and from random ones, `initial_states` in all, over its operating
-    range.
+    """Simulate a design over its operating range [rad/s] from its own and random initial states, `initial_states` in
+    all.
 
-    The method is machine code with adaptive steps: other steps than those of the orbits that the search followed.
+    Steps are adaptive, in machine code, and thus independent of those of the orbits in the search.
     """
     speeds = np.linspace(*operating, SPEEDS)
     own = np.asarray(states_at(model, speeds, None))[:, :initial_states]

@@ -1,4 +1,4 @@
-"""A design with the parameters that may change and their bounds: places between them, and the designs there."""
+"""Design spaces: a design, the parameters that may change, and their bounds."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -19,12 +19,11 @@ Models = Sequence[AbstractForcedSystem]
 Bounds = Mapping[str, tuple[float, float]]
 """Smallest and largest value [SI] by parameter name."""
 Places = Float[np.ndarray, "designs n"]
-"""Parameters of designs as parts of the way from their lower bounds to their upper ones."""
+"""Parameters of designs, scaled to 0 at their lower and 1 at their upper bounds."""
 
 
 class Value(NamedTuple):
-    """A number that a design is judged by, its derivatives by the place in the design space, and the cage speed [rpm]
-    to which it belongs."""
+    """Property of a design, its gradient in the design space, and the cage speed [rpm] at which it occurs."""
 
     value: float
     slope: Float[np.ndarray, " n"]
@@ -32,19 +31,18 @@ class Value(NamedTuple):
 
 
 class DesignSpace(eqx.Module):
-    """A design and bounds of some parameters: a function from a place, 0 to 1 in each parameter, to the design there,
-    which JAX differentiates."""
+    """Design with bounds of some parameters: a differentiable function from a place, 0 to 1 in each, to a design."""
 
     system: AbstractForcedSystem
     lower: Float[np.ndarray, " n"]
-    """Smallest values [SI]."""
+    """Lower bounds [SI]."""
     span: Float[np.ndarray, " n"]
-    """Distances of the bounds [SI]."""
+    """Upper minus lower bounds [SI]."""
     names: tuple[str, ...] = eqx.field(static=True)
 
     @classmethod
     def of(cls, system: AbstractForcedSystem, vary: Bounds) -> "DesignSpace":
-        """The space within bounds.
+        """Design space within bounds.
 
         **Raises:** `ValueError` for a parameter that the system does not have, bounds that do not ascend, or none.
         """
@@ -61,7 +59,7 @@ class DesignSpace(eqx.Module):
 
     @property
     def place(self) -> Float[np.ndarray, " n"]:
-        """Place of the design itself."""
+        """Place of the given design."""
         known = parameters(self.system)
         return (np.array([float(known[name]) for name in self.names]) - self.lower) / self.span
 
@@ -70,15 +68,14 @@ class DesignSpace(eqx.Module):
         return dict(zip(self.names, (self.lower + place * self.span).tolist(), strict=True))
 
     def model(self, place: Float[np.ndarray, " n"]) -> AbstractForcedSystem:
-        """The design at a place."""
+        """Design at a place."""
         return replace(self.system, **self.values(place))
 
     def models(self, places: Places) -> list[AbstractForcedSystem]:
-        """The designs at some places."""
         return [self.model(place) for place in places]
 
     def slope_of(self, derivative: Mapping[str, float]) -> Float[np.ndarray, " n"]:
-        """Derivatives by the place, from derivatives by the parameters [SI]."""
+        """Gradient in the design space, from derivatives by the parameters [SI]."""
         return np.array([derivative[name] for name in self.names]) * self.span
 
     def __call__(self, place: Float[Array, " n"]) -> AbstractForcedSystem:
@@ -88,7 +85,7 @@ class DesignSpace(eqx.Module):
 
 @compiled
 def function_value(function: Callable[[Any], Any], designs: DesignSpace, place: Array) -> tuple[Array, Array]:
-    """Return a function of the design and its derivatives by the place."""
+    """Value and gradient of a function of the design, at a place."""
     f = lambda x: jnp.asarray(function(designs(x)), dtype=float)
     slope, value = jax.jacfwd(lambda x: (f(x),) * 2, has_aux=True)(place)
     return value, slope

@@ -1,8 +1,8 @@
-"""Loads of the guiding land, and size and whirl of the motion, over revolutions that go on from the end of a sweep.
+"""Loads of the guiding land, and size and whirl of the motion, over revolutions that continue from the end of a sweep.
 
 Archard's law (J. F. Archard, J. Appl. Phys. 24 (1953) 981): the volume worn off is k N s, with the normal force N, the
-sliding distance s and a specific wear rate k of the two surfaces and their oil. k is a shop's own number and the same
-for every design; a design changes the mean of N times the sliding speed.
+sliding distance s and a specific wear rate k of the two surfaces and their oil. k must be measured and is the same for
+every design; a design changes the mean of N times the sliding speed.
 """
 
 from collections.abc import Sequence
@@ -20,14 +20,14 @@ from ..solve import REVOLUTION, AbstractMethod, Lanes, histories, native
 
 FILM = "least film"
 LAND_LOADS = {"wear load": "N m/s", "peak land force": "N", "film drag power": "W", FILM: "m"}
-"""Loads of the land, with their units: mean contact force times sliding speed, largest contact force over some
-revolutions, mean power to shear the film, and the smallest distance of cage and rib, which is 0 where they touch."""
+"""Loads of the land, with their units: mean contact force times sliding speed, largest contact force, mean power lost
+by shear of the film, and least distance of cage and rib, 0 where they touch."""
 SAMPLES, REVOLUTIONS = 512, 4
-"""Phases of a revolution at which loads are read, and revolutions. A blow on the land lasts for some hundredths of a
-radian: its peak is read up to 5 % too low (case 1b at 9000 and 27500 rpm beside 4096 phases), its impulse to 0.5 %."""
+"""Samples per revolution, and revolutions, for the loads. An impact on the land lasts some hundredths of a radian: its
+peak is up to 5 % too low (case 1b at 9000 and 27500 rpm against 4096 samples), its impulse accurate to 0.5 %."""
 MOTION_SAMPLES, MOTION_REVOLUTIONS = 32, 32
-"""The same of the motion: the size of a circle at cage frequency is read up to 0.5 % too small, that of one at the
-fourth order up to 8 %; orders are resolved to 1/32, and interpolated between."""
+"""Samples per revolution, and revolutions, for the motion. The size of a circle at cage frequency is up to 0.5 % too
+small, at the fourth order up to 8 %; orders are resolved to 1/32, and interpolated between."""
 
 
 Designs = CageModel | Sequence[CageModel]
@@ -36,7 +36,7 @@ Designs = CageModel | Sequence[CageModel]
 def _seen(
     models: Designs, found: xr.Dataset, samples: int, revolutions: int, method: AbstractMethod | None
 ) -> tuple[Lanes, Float[np.ndarray, "lanes samples dim"], Bool[np.ndarray, " lanes"]]:
-    """Lanes that go on from the end of a sweep, their states at each phase, and whether these are known."""
+    """Lanes continued from the end of a sweep, their states at each sample, and True where these are accurate."""
     last, several = found["last"], isinstance(models, Sequence)
     place = np.indices(last.shape[:-1]).reshape(last.ndim - 1, -1)
     which = place[0] if several else np.zeros(place.shape[1], dtype=int)
@@ -47,8 +47,8 @@ def _seen(
 
 
 def land_reading(model: CageModel, speed: Array, tau: Array, y: Array) -> Float[Array, "3"]:
-    """Contact force of the land on the cage [N], power to shear the film [W], and distance of the cage's centre from
-    that of its guide [m], in a state at a phase."""
+    """Contact force of the land on the cage [N], power lost by shear of the film [W], and distance of the cage's centre
+    from that of its guide [m], for state `y` at phase `tau`."""
     q, v = jnp.split(y, 2)
     if q.size == 4:  # an elastic rib moves too
         q, v = q[:2] - q[2:], v[:2] - v[2:]
@@ -71,7 +71,7 @@ def _loads(model: CageModel, speed: Array, states: Array) -> Float[Array, "4"]:
 def land_loads(
     models: Designs, found: xr.Dataset, method: AbstractMethod | None = None
 ) -> dict[str, Float[np.ndarray, "*lanes"]]:
-    """Loads of the land (`LAND_LOADS`) in each lane of a sweep; NaN where a lane is not known to the method's error.
+    """Loads of the land (`LAND_LOADS`) in each lane of a sweep; NaN where the error exceeds that allowed by the method.
 
     **Arguments:** model or designs, and their sweep; integration method, by default `jaxcage.native()`.
     """
@@ -88,9 +88,9 @@ def motions(
 
     **Arguments:** as `land_loads`.
 
-    **Returns:** size [m] from one end to the other, as a probe reads it, the larger of horizontal and vertical; order
-    of the largest line in the spectrum of x + i y, a multiple of the cage speed, negative where it whirls against the
-    rotation, NaN where the centre stands still. Both are NaN where a lane is not known to the method's error.
+    **Returns:** peak-to-peak size [m], the larger of horizontal and vertical, as a probe measures it; order of the
+    largest line in the spectrum of x + i y, a multiple of the cage speed, negative for backward whirl, NaN if the
+    centre is at rest. Both are NaN where the error exceeds that allowed by the method.
     """
     _, seen, known = _seen(models, found, MOTION_SAMPLES, MOTION_REVOLUTIONS, method)
     state = np.where(known[:, None, None], seen, np.nan)
@@ -100,7 +100,7 @@ def motions(
 
 
 def _order(path: Complex[np.ndarray, " samples"]) -> float:
-    """Order of the largest line, by a Hann window."""
+    """Order of the largest spectral line, with a Hann window."""
     if not np.all(np.isfinite(path)) or np.max(np.abs(path - path[0])) == 0:
         return float("nan")
     n = path.size

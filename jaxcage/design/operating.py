@@ -1,9 +1,8 @@
-"""What a design does over a range of speed, with exact derivatives by the design.
+"""Stability edges and worst values of a design over a range of speed, with exact derivatives by the design.
 
-The range is calm where the synchronous orbit is stable. Edges of that stable range are bifurcations, which are followed
-from the nearest design at which they are known. The orbits between are followed through the operating range, and of
-what they do the worst counts, at whatever speed. A worst value moves with the design as it does at its own speed, which
-is held (the envelope theorem).
+The motion is calm where the synchronous orbit is stable. Edges of that stable range are bifurcations, which are
+followed from the nearest design at which they are known. The orbits between are followed through the operating range,
+and their worst value over speed counts. Its gradient is that at fixed speed (the envelope theorem).
 """
 
 import dataclasses
@@ -40,17 +39,17 @@ from .requirements import Requirement, balance_grade
 
 
 PARTS = 4096
-"""Phases of a revolution at which an orbit is read. Where the land is touched its force, the least film and the drag
-have derivatives to 0.1 % by so many, and to 2 % by 512."""
+"""Samples of an orbit per revolution. In contact with the land, the derivatives of its force, of the least film and of
+the drag are accurate to 0.1 %, and to 2 % with 512 samples."""
 REACH = 0.5, 2.0
-"""Limits of speed within which edges are looked for, over the lower and the upper end of the operating range."""
+"""Limits of the speeds searched for edges, over the lower and the upper end of the operating range."""
 RIVAL = 0.02
-"""Local maxima over speed that are nearer than this part of the largest value are refined too."""
-FAR = 0.1  # an orbit moves by less from design to design, in units of the scale
-BESIDE = 1e-3  # orbits nearer to an edge are not looked at, relative
-PEAKING = 0.8  # smaller multipliers are no concern
-WORST_AT = 1e-4  # accuracy of the speed of a worst value, relative
-KEPT = 1e-3  # slack, negative, at which a requirement still counts as kept
+"""Local maxima over speed are refined within this fraction of the spread of values from the largest one."""
+FAR = 0.1  # largest change of an orbit from design to design, in units of the scale
+BESIDE = 1e-3  # relative distance from an edge within which orbits are ignored
+PEAKING = 0.8  # smaller maxima of the multiplier are ignored
+WORST_AT = 1e-4  # relative accuracy of the speed of a worst value
+KEPT = 1e-3  # violation up to which a requirement still counts as kept
 RPM = 30 / np.pi
 READ = "land force", "drag", "film"
 
@@ -59,8 +58,8 @@ READ = "land force", "drag", "film"
 
 
 def _readings(system: Any, speed: Array, state: Array, method: AbstractMethod) -> Float[Array, "3"]:
-    """Return the largest land force [N], the mean power to shear the film [W] and minus the least distance of cage and
-    land [m] over a revolution from a state; largest values are read between the samples, by a parabola."""
+    """Return the largest land force [N], the mean power lost by shear of the film [W] and minus the least distance of
+    cage and land [m] over a revolution; maxima are interpolated by a parabola."""
     strobe = strobe_map(system, speed, method)
 
     def part(i: Array, carry: tuple) -> tuple:
@@ -88,14 +87,13 @@ def _read(designs: DesignSpace, place: Array, speed: Array, state: Array, method
 def _read_moved(
     designs: DesignSpace, place: Array, speed: Array, state: Array, moves: Array, method: AbstractMethod
 ) -> Array:
-    """Return the derivatives of the readings by the place, the orbit moving with it."""
+    """Return the gradient of the readings, including the change of the orbit with the design."""
     at = lambda x: _readings(designs(x), speed, state + moves @ (x - place), method)
     return jax.jacfwd(at)(place)
 
 
 class Through(NamedTuple):
-    """Orbits through a range of speed at one place of the design space, by ascending speed: speeds [rad/s], states [SI]
-    and sizes of the largest multipliers."""
+    """Orbits of one design over a range: ascending speeds [rad/s], states [SI], moduli of the largest multipliers."""
 
     space: DesignSpace
     place: Float[np.ndarray, " n"]
@@ -105,8 +103,7 @@ class Through(NamedTuple):
 
     @classmethod
     def of(cls, space: DesignSpace, place: Float[np.ndarray, " n"], orbit: Orbit, low: float, high: float) -> "Through":
-        """The orbits between two speeds by continuation of one of them, as far as the speed rises or falls throughout:
-        past a fold there are other orbits at the same speeds."""
+        """Continue an orbit between two speeds, up to the nearest folds, where the branch turns back in speed."""
         found = branch(space.model(place), orbit, lower=low, upper=high)
         speed, state = float(orbit.speed), np.asarray(orbit.state)
         away = np.abs(found.speed / speed - 1) + np.linalg.norm(found.state - state, axis=1) / np.linalg.norm(state)
@@ -120,16 +117,15 @@ class Through(NamedTuple):
         return cls(space, place, found.value[some], found.state[some], sizes)
 
     def state(self, speed: float) -> Float[np.ndarray, " dim"]:
-        """State near the orbit at a speed."""
+        """State of the orbit at a speed, interpolated."""
         return np.array([np.interp(speed, self.speeds, c) for c in self.states.T])
 
     def orbit(self, speed: float) -> Orbit:
-        """The orbit at a speed."""
         return periodic_orbit(self.space.model(self.place), speed, guess=self.state(speed))
 
     def size(self, orbit: Orbit, name: str, speed: float | None = None) -> float:
-        """How bad an orbit is, or that of another speed, by the method of this one with a step at least from one phase
-        to the next."""
+        """Value of a quantity for an orbit, larger being worse, -inf if it did not converge; or for the interpolated
+        state at another speed, with the method of this orbit and at least one step per sample."""
         if speed is None and not bool(orbit.converged):
             return -np.inf
         if name == "multiplier":
@@ -139,7 +135,7 @@ class Through(NamedTuple):
         return float(_read(self.space, place, *at, _reader(orbit))[READ.index(name)])
 
     def value(self, orbit: Orbit, name: str) -> Value:
-        """A value of an orbit with its derivatives."""
+        """Value of a quantity for an orbit, with its gradient."""
         moves, rpm = orbit_slopes(self.space, self.place, orbit), float(orbit.speed) * RPM
         if name == "multiplier":
             return Value(moves.multiplier, moves.multiplier_slope, rpm)
@@ -149,13 +145,13 @@ class Through(NamedTuple):
         return Value(sign * self.size(orbit, name), sign * slope, rpm)
 
     def largest(self, name: str, low: float, high: float) -> Orbit:
-        """The orbit between two speeds at which a quantity is largest, its speed to `WORST_AT`."""
+        """Orbit between two speeds at which a quantity is largest; its speed is accurate to `WORST_AT`."""
         minus = lambda speed: -float(np.nan_to_num(self.size(self.orbit(float(speed)), name), neginf=0.0))
         found = minimize_scalar(minus, bounds=(low, high), method="bounded", options={"xatol": WORST_AT * high})
         return self.orbit(float(found.x))
 
     def worst(self, name: str, low: float, high: float) -> Value:
-        """A value where it is worst between two speeds."""
+        """Worst value of a quantity between two speeds."""
         inner = (self.speeds > low) & (self.speeds < high)
         ends = [self.orbit(low), self.orbit(high)]
         by_branch = self.sizes[inner]
@@ -169,7 +165,7 @@ class Through(NamedTuple):
 
 
 def _maxima(sizes: np.ndarray) -> list[int]:
-    """Places of the local maxima within a row of numbers."""
+    """Indices of the interior local maxima."""
     return [k for k in range(1, sizes.size - 1) if sizes[k - 1] < sizes[k] >= sizes[k + 1]]
 
 
@@ -182,7 +178,7 @@ def _reader(orbit: Orbit) -> AbstractMethod:
 
 
 class _Anchor(NamedTuple):
-    """A design at which edges are known; of a stable range also one of its orbits, over the scale, and its speed."""
+    """Design at which edges are known; for a stable range also one of its orbits, over the scale, and its speed."""
 
     place: Float[np.ndarray, " n"]
     edges: Mapping[str, Point | None]
@@ -204,19 +200,19 @@ class _AroundEdges:
         self._anchors = [self._first()]
 
     def _first(self) -> _Anchor:
-        """The edges of the given design. **Raises:** `InputError` if there are none."""
+        """Edges of the given design. **Raises:** `InputError` if there are none."""
         raise NotImplementedError
 
     def _nearest(self, place: np.ndarray) -> _Anchor:
         return min(self._anchors, key=lambda a: float(np.sum((a.place - place) ** 2)))
 
     def _followed(self, near: _Anchor, place: np.ndarray) -> dict[str, Followed]:
-        """What became of the edges that an anchor has, at a place."""
+        """Follow the edges of an anchor to a place."""
         known = {name: point for name, point in near.edges.items() if point is not None}
         return follow_all(self.space.model(near.place), known, self.space.model(place), self.limits)
 
     def _keep(self, near: _Anchor, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> None:
-        """Follow edges from this place, too."""
+        """Make a place an anchor, from which edges are followed too."""
         at = lambda edge: Point(edge.kind, edge.value_rpm / RPM, np.asarray(edge.state), steps=edge.steps)
         points = {name: None if edge is None else at(edge) for name, edge in edges.items()}
         self._anchors.append(near._replace(place=place.copy(), edges=points))
@@ -224,9 +220,9 @@ class _AroundEdges:
 
 @dataclasses.dataclass
 class UnstableWidth(_AroundEdges):
-    """The sum of the widths of unstable ranges [rpm], cut at the ends of a range of speed, and its exact derivatives.
+    """Total width of the unstable ranges [rpm] within a range of speed, with its exact gradient.
 
-    The edges are those that a search finds at the first design. Two edges of one range that meet leave none of it.
+    A search at the first design finds the edges. An unstable range vanishes where its two edges meet.
     """
 
     def _first(self) -> _Anchor:
@@ -260,11 +256,11 @@ class UnstableWidth(_AroundEdges):
 
 @dataclasses.dataclass
 class OperatingRange(_AroundEdges):
-    """The edges and orbits of designs around an operating range, and what they are worth.
+    """Edges and orbits of designs around an operating range, and the values that requirements concern.
 
-    An edge that ends on the way from design to design, or past which the orbit was unstable already, is replaced by the
-    one that bounds the stable range now; `handed_over` says so in words. Orbits are followed over a `margin` beyond
-    both ends as well, per cent of their speeds.
+    An edge that ends on the way from design to design, or no longer bounds the stable range, is replaced by one that
+    does, which `handed_over` records. Orbits are followed over a `margin` beyond both ends too, per cent of their
+    speeds.
     """
 
     margin: float = 0.0
@@ -282,7 +278,7 @@ class OperatingRange(_AroundEdges):
         return self._anchor(self.space.place, found)
 
     def _anchor(self, place: np.ndarray, found: StableRange) -> _Anchor:
-        """The anchor at a place with its stable range. **Raises:** `InputError` for an end that is no bifurcation."""
+        """Anchor at a place with its stable range. **Raises:** `InputError` for an end that is no bifurcation."""
         for point, end, limit in zip((found.lower, found.upper), found.ends, self.limits):
             if point is None and abs(end - limit) > 1e-6 * limit:
                 raise InputError(
@@ -299,9 +295,9 @@ class OperatingRange(_AroundEdges):
         return np.array([float(c) for c in self.space.model(place).scale(speed)])
 
     def edges(self, place: Float[np.ndarray, " n"]) -> dict[str, Sensitivity | None] | str:
-        """The edges of the stable range, `lower` and `upper`, None where it is open; or why there are none.
+        """Edges of the stable range, `lower` and `upper`, None where it is open; or why there are none.
 
-        They stay if an unstable range is born between them: `peak` is above 1 there, and its slope leads back.
+        They are kept if an unstable range appears between them: `peak` then exceeds 1, and its gradient leads back.
         """
         near = self._nearest(place)
         moved = self._followed(near, place)
@@ -318,7 +314,7 @@ class OperatingRange(_AroundEdges):
     def _searched_again(
         self, place: np.ndarray, near: _Anchor, moved: Mapping[str, Followed]
     ) -> dict[str, Sensitivity | None] | str:
-        """The edges that bound the stable range now, by a search from its orbit."""
+        """Search for the edges that now bound the stable range, from its orbit."""
         guess = (near.state * self._scale(place, near.speed), near.speed)
         search = partial(stable_range, self.space.model(place), self.operating, self.limits)
         found = search([guess]) or search()
@@ -341,13 +337,13 @@ class OperatingRange(_AroundEdges):
         return {name: solved.get(name) for name in anchor.edges}
 
     def values(self, place: Float[np.ndarray, " n"], wanted: Sequence[Requirement]) -> dict[str, Value] | str:
-        """All values that some limits concern, at a place of the design space; or why there are none."""
+        """Values of all requirements at a place of the design space; or why there are none."""
         before, names = len(self.handed_over), {r.of for r in wanted}
         found = self.margins(place)
         if isinstance(found, str):
             return found
         if len(self.handed_over) > before and min(r.slack(found[r.of])[0] for r in wanted[:2]) < -KEPT:
-            self._anchors.pop()  # the wrong side of a jump, where no slope leads back
+            self._anchors.pop()  # beyond a jump of an edge, where no gradient leads back
             return "; ".join(self.handed_over[before:])
         if "balance" in names:
             found["balance"] = balance_grade(self.space, self.operating, place)
@@ -355,9 +351,8 @@ class OperatingRange(_AroundEdges):
         return worst if isinstance(worst, str) else found | worst
 
     def margins(self, place: Float[np.ndarray, " n"]) -> dict[str, Value] | str:
-        """Distances of both ends of the operating range from the edges [per cent of the end's speed], negative where
-        the end lies outside, with the `peak`; or why there are none. Where no edge is found, the distance of the
-        search's limit."""
+        """Margins of both ends of the operating range to the edges [per cent of the end's speed], negative outside the
+        stable range, and the `peak`; or why there are none. Without an edge, the margin to the limit of the search."""
         edges = self.edges(place)
         if isinstance(edges, str):
             return edges
@@ -374,7 +369,7 @@ class OperatingRange(_AroundEdges):
     # --- orbits between the edges -----------------------------------------------------------------------------------
 
     def _orbit(self, place: np.ndarray) -> Orbit | None:
-        """An orbit of the stable range at a place, found from the nearest known one in parts of the way."""
+        """Orbit of the stable range at a place, continued from the nearest known one in parts of the way."""
         near = self._nearest(place)
         state, done, part = near.state, 0.0, 1.0
         while part > 0.05:
@@ -390,7 +385,7 @@ class OperatingRange(_AroundEdges):
         return None
 
     def through(self, place: Float[np.ndarray, " n"]) -> Through | None:
-        """The orbits through the operating range and the margins beside it; None if they are lost."""
+        """Orbits through the operating range and its margins; None if they are lost."""
         key = np.asarray(place).tobytes()
         if key not in self._through:
             orbit, (low, high) = self._orbit(place), self.wider
@@ -399,7 +394,7 @@ class OperatingRange(_AroundEdges):
         return self._through[key]
 
     def _between(self, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> tuple[np.ndarray, np.ndarray]:
-        """Speeds of the orbits between the edges, ascending, and sizes of their largest multipliers, 1 at an edge."""
+        """Ascending speeds of the orbits between the edges, and moduli of their largest multipliers, 1 at an edge."""
         if (through := self.through(place)) is None:
             return np.zeros(0), np.zeros(0)
         (low, high), lower, upper = self.wider, edges["lower"], edges["upper"]
@@ -411,7 +406,7 @@ class OperatingRange(_AroundEdges):
         return np.concatenate(speeds), np.concatenate([first, through.sizes[inside], last])
 
     def _stable_ends(self, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> bool:
-        """Whether the orbits at the ends of the margins are stable, where the edges lie beyond them."""
+        """True if the orbits at the ends of the margins are stable, where the edges lie beyond them."""
         through = self.through(place)
         for name, end, sign in (("lower", self.wider[0], 1.0), ("upper", self.wider[1], -1.0)):
             edge = edges[name]
@@ -421,7 +416,7 @@ class OperatingRange(_AroundEdges):
         return True
 
     def peak(self, place: Float[np.ndarray, " n"], edges: Mapping[str, Sensitivity | None]) -> Value:
-        """The largest multiplier at a maximum between the edges: where it passes 1, a new unstable range is born."""
+        """Largest local maximum of the multiplier between the edges; beyond 1 there is a new unstable range."""
         through, (speeds, sizes) = self.through(place), self._between(place, edges)
         inner = [k for k in _maxima(sizes) if sizes[k] > PEAKING]
         if through is None or not inner:
@@ -430,8 +425,8 @@ class OperatingRange(_AroundEdges):
         return through.value(through.largest("multiplier", speeds[k - 1], speeds[k + 1]), "multiplier")
 
     def worst(self, place: Float[np.ndarray, " n"], names: tuple[str, ...]) -> dict[str, Value] | str:
-        """The worst over the operating range of some of `multiplier`, `film`, `land force`, `drag`; or why there is
-        none. `film` is the least distance of cage and land [m], negative where they touch."""
+        """Worst values over the operating range of some of `multiplier`, `film`, `land force`, `drag`; or why there are
+        none. `film` is the least distance of cage and land [m], negative in contact."""
         if names and (through := self.through(place)) is not None:
             return {name: through.worst(name, *self.operating) for name in names}
         return "the orbits of the operating range are lost" if names else {}

@@ -1,9 +1,9 @@
-"""Designs for calm operation: the lowest cost at which all requirements hold, by exact gradients.
+"""Search for designs with calm operation: least cost at which all requirements hold, by exact gradients.
 
-Requirements are constraints of sequential programmes within a trust region, each solved by SciPy's SLSQP, or of an
-augmented Lagrangian whose descent is optax's. With tolerances each requirement is that of the worst bearing within
-them: the gradient names the corner, and the edges are solved for there. The derivatives there are those of the worst
-case (the envelope theorem).
+Requirements are constraints of sequential programming in a trust region, with SciPy's SLSQP, or of an augmented
+Lagrangian minimised by optax. With tolerances, each requirement must hold for the worst bearing within them: signs of
+the gradient select the corner, where edges are solved for. The gradient there is that of the worst case (envelope
+theorem).
 """
 
 import dataclasses
@@ -36,19 +36,19 @@ from .requirements import (
 )
 
 
-AT_BOUND = 1e-6  # distance from a bound, over both bounds' distance, of a place at it
+AT_BOUND = 1e-6  # distance from a bound, relative to the span, at which a parameter counts as at the bound
 WIDEST = 4.0  # largest multiple of a tolerance that is tried
-LOST = 10.0  # slack of every requirement, negative, at a trial that has no values
-ACTIVE = 5e-3  # slack below which a requirement takes part in the cost
-NEAR_STOP = 0.03  # distance of a trial that lost an edge, over the bounds, at which it stops the search
+LOST = 10.0  # violation of every requirement at a trial without values
+ACTIVE = 5e-3  # slack below which a requirement counts as active
+NEAR_STOP = 0.03  # distance, relative to the spans, within which a trial that lost an edge limits the design
 ITERATIONS, ACCURACY = 30, 1e-4
-FIRST_RADIUS, LARGEST_RADIUS, LEAST_RADIUS = 0.1, 0.4, 2e-3  # of the steps, over the bounds
-PENALTY = 10.0  # price of a shortfall by 1, over the cost of the given design
+FIRST_RADIUS, LARGEST_RADIUS, LEAST_RADIUS = 0.1, 0.4, 2e-3  # trust region, relative to the spans
+PENALTY = 10.0  # penalty of a violation by 1, relative to the cost of the given design
 
 
 class Trial(NamedTuple):
-    """A place of the design space: cost with its derivatives, slacks of the requirements with theirs, for the worst
-    bearing within the tolerances; nominal values, and those of the worst bearing for each requirement."""
+    """Evaluation of a design: cost with its gradient, slacks of the requirements with theirs, for the worst bearing
+    within the tolerances; nominal values, worst values by requirement, and why there are none."""
 
     place: Float[np.ndarray, " n"]
     cost: float
@@ -62,19 +62,18 @@ class Trial(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Design:
-    """A design for calm operation, and what is known of it.
+    """Result of a search for a design with calm operation.
 
-    - `model`: the design; `values`: its changed parameters [SI]; `cost` and that of the given design, `cost_before`.
-    - `before` and `after`: what each requirement concerns, at the given design and at this one.
-    - `feasible`: whether every requirement holds, for every bearing within the tolerances if there are some.
-    - `short`: how far each broken requirement is from holding, in its unit; `conflict`: requirements and bounds that
-        together forbid a feasible design, empty if there is one.
-    - `prices`: what one unit more of each requirement that binds costs (Lagrange multipliers).
-    - `at_bound`: parameters at a bound; `worst`: what each requirement is for the worst bearing within the tolerances.
-    - `stopped_by`: the edge that a further step towards less cost would lose, if that and no requirement ends the
-        search; `notes`: edges that ended on the way, and what bounds the range now.
-    - `budget`: how wide each tolerance may be.
-    - `evaluations`: designs whose edges were solved for; `checked`: a sweep from many initial states, None without.
+    - `model`: the design; `values`: its varied parameters [SI]; `cost` and that of the given design, `cost_before`.
+    - `before` and `after`: values that the requirements concern, for the given design and for this one.
+    - `feasible`: True if every requirement holds, for every bearing within the tolerances if there are some.
+    - `short`: violation of each broken requirement, in its unit; `conflict`: requirements and bounds that together
+        prevent a feasible design, empty if there is one.
+    - `prices`: cost of one unit more of each binding requirement (Lagrange multipliers).
+    - `at_bound`: parameters at a bound; `worst`: value of each requirement for the worst bearing within the tolerances.
+    - `stopped_by`: reason why a nearby design lost an edge, empty if none did; `notes`: edges that were replaced.
+    - `budget`: admissible width of each tolerance.
+    - `evaluations`: number of designs whose edges were solved for; `checked`: simulations from many initial states.
     """
 
     model: AbstractForcedSystem
@@ -99,7 +98,7 @@ class Design:
 
     @property
     def verdict(self) -> str:
-        """`calm`, `stable, but not from every start`, `stable, not checked` or `not feasible`."""
+        """One of `calm`, `stable, but not from every start`, `stable, not checked` and `not feasible`."""
         if not self.feasible:
             return "not feasible"
         if self.checked is None:
@@ -118,8 +117,8 @@ class Design:
 class Problem:
     """Trials of one search, each computed once.
 
-    **Arguments:** operating range, or width of unstable ranges, which is then the cost; requirements; cost; parameters
-    that vary; tolerances.
+    **Arguments:** operating range, or width of unstable ranges, which is then the cost; requirements; cost; mask of
+    what varies; tolerances.
     """
 
     def __init__(
@@ -137,11 +136,11 @@ class Problem:
 
     @property
     def evaluations(self) -> int:
-        """Designs whose edges were solved for."""
+        """Number of designs whose edges were solved for."""
         return len(self.solved)
 
     def at(self, place: np.ndarray) -> Trial:
-        """The trial at a place."""
+        """Trial at a place, computed if need be."""
         place = np.asarray(place, dtype=float)
         key = place.tobytes()
         if key not in self.trials:
@@ -149,7 +148,6 @@ class Problem:
         return self.trials[key]
 
     def compute(self, place: np.ndarray) -> Trial:
-        """The trial at a place."""
         values = self._values(place)
         worst = values if isinstance(values, str) else self.worst(place, values, self.tolerance)
         cost, slope = self._costs(place, values)
@@ -162,32 +160,30 @@ class Problem:
         return Trial(place, cost, slope, slack, by, values, worst)
 
     def _costs(self, place: np.ndarray, values: dict[str, Value] | str) -> tuple[float, np.ndarray]:
-        """The cost of a design with its values, and its derivatives by the place."""
+        """Cost of a design with these values, and its gradient."""
         if self.cost is None:
             return (np.inf, np.zeros(place.size)) if isinstance(values, str) else values["width"][:2]
         value, slope = function_value(self.cost, self.space, jnp.asarray(place))
         return float(value), np.asarray(slope)
 
     def foreseen(self, trial: Trial, place: np.ndarray) -> tuple[float, np.ndarray]:
-        """The cost near a trial and its derivatives, to first order where it is dear to compute."""
+        """Cost near a trial and its gradient, to first order where it is expensive to compute."""
         if self.cost is not None:
             return self._costs(place, {})
         return trial.cost + float(trial.cost_slope @ (place - trial.place)), trial.cost_slope
 
     def priced(self, trial: Trial, size: float) -> float:
-        """The cost over a size, and what the worst requirement falls short at its price: one number to be made small,
-        also for a search without derivatives."""
+        """Merit to be minimised: the cost over a size, plus a penalty on the largest violation."""
         return trial.cost / size + PENALTY * max(0.0, -float(np.min(trial.slack, initial=np.inf)))
 
     def _values(self, place: np.ndarray) -> dict[str, Value] | str:
-        """Values of one bearing; or why there are none."""
         key = place.tobytes()
         if key not in self.solved:
             self.solved[key] = self.range.values(place, self.wanted)
         return self.solved[key]
 
     def worst(self, place: np.ndarray, values: Any, tolerance: Mapping[str, Tolerance]) -> dict[str, Value] | str:
-        """What each requirement concerns for the worst bearing within tolerances; or why that is not known."""
+        """Value of each requirement for the worst bearing within tolerances; or why it is not known."""
         found = {}
         for r in self.wanted:
             there, (_, slope) = place.copy(), r.slack(values[r.of])
@@ -202,7 +198,7 @@ class Problem:
         return found
 
     def whole(self, x: np.ndarray, like: np.ndarray) -> np.ndarray:
-        """The place of the parameters that vary, the others as they are at `like`."""
+        """Place with these values of the varied parameters and the others of `like`."""
         place = like.copy()
         place[self.free] = x
         return place
@@ -227,20 +223,20 @@ def design_for(
 
     **Arguments:**
 
-    - `model`: the design to begin with; its edges are followed from there.
-    - `operating`: ends of the range of cage speed [rad/s] in which the machine runs.
+    - `model`: the given design, from which edges are followed.
+    - `operating`: lowest and highest cage speed in operation [rad/s].
     - `vary`: smallest and largest value [SI] of each parameter that may change.
-    - `keep`: what must hold over the range.
-    - `cost`: prices by parameter name, or a function of the design that JAX differentiates; by default prices of
-        turning and balancing (`COSTS`).
-    - `objective`: `cost`, or `width`: the exact width of the unstable ranges within `operating`, whose margins are then
-        no requirement, and of the others only `balance` may be given.
-    - `tolerance`: what manufacture makes of parameters, varied or not; every requirement then holds for the worst.
+    - `keep`: requirements over the range.
+    - `cost`: prices by parameter name, or a differentiable function of the design; by default prices of turning and
+        balancing (`COSTS`).
+    - `objective`: `cost`, or `width`, the exact width of the unstable ranges within `operating`: margins are then not
+        required, and only `balance` may be.
+    - `tolerance`: tolerances of parameters, varied or not; every requirement then holds for the worst case.
     - `search`: `slsqp`, or `augmented` for optax's Adam on an augmented Lagrangian.
-    - `searches`, `seed`: searches, the first from the design itself, others from quasi-random places.
-    - `check`: initial states from which the result is swept over the range, with other steps; 0 leaves it out.
+    - `searches`, `seed`: number of searches, the first from the design itself, others from quasi-random places.
+    - `check`: initial states from which the result is simulated over the range, with other steps; 0 leaves it out.
 
-    **Returns:** `Design`; if no design keeps all requirements, the one that falls short least, and which conflict.
+    **Returns:** `Design`; if none is feasible, that with the least violation, and the requirements in conflict.
 
     **Raises:** `ValueError` for a range without a stable orbit, or whose stable range does not end in bifurcations.
     """
@@ -273,7 +269,7 @@ def design_for(
 
 
 def _merit(problem: Problem, place: np.ndarray) -> tuple[float, float]:
-    """Order of designs: by what they fall short, then by cost."""
+    """Sort key of designs: violation, then cost."""
     trial = problem.at(place)
     return float(np.max(np.maximum(-trial.slack - KEPT, 0), initial=0.0)), trial.cost
 
@@ -282,13 +278,12 @@ def _merit(problem: Problem, place: np.ndarray) -> tuple[float, float]:
 
 
 def _programme(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
-    """The best place by sequential programmes within a trust region.
+    """Find the best place by sequential programming in a trust region.
 
-    Each programme has the cost itself, where it is cheap, and the requirements linearised with their exact derivatives;
-    SciPy's SLSQP solves it. Its step is one solution of the edges; a step that loses an edge is halved, and so is one
-    that gains less than a tenth of what was foreseen, once its linearised requirements have been added. What the worst
-    requirement falls short is bought at a price that outweighs the cost, so that the search leads to a feasible place
-    or, where there is none, to the least shortfall.
+    Each subproblem has the cost itself, where it is cheap, and the requirements linearised with their exact gradients;
+    SciPy's SLSQP solves it. A step costs one solution of the edges. A step that loses an edge is halved, and so is one
+    that gains less than a tenth of the prediction, once its linearised requirements have been added. The penalty on the
+    largest violation outweighs the cost, so that the search ends at a feasible place or at the least violation.
     """
     trial, radius, largest = problem.at(begin), FIRST_RADIUS, LARGEST_RADIUS
     size, refused = max(abs(trial.cost), 1e-12), list[Trial]()
@@ -303,7 +298,7 @@ def _programme(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) 
         if new.lost:
             radius, largest = reach / 2, reach / 4  # a longer step would lose the edge again
         elif kept < 0.25:
-            radius = reach if kept <= 0.1 and not refused else reach / 2  # what was learned is tried first
+            radius = reach if kept <= 0.1 and not refused else reach / 2  # the first retry only adds a linearisation
         elif kept > 0.75:
             radius, largest = min(2 * radius, largest), min(2 * largest, LARGEST_RADIUS)
         if kept > 0.1 and not new.lost:
@@ -317,10 +312,10 @@ def _programme(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) 
 def _step(
     problem: Problem, trial: Trial, refused: Sequence[Trial], radius: float, size: float
 ) -> tuple[np.ndarray, float]:
-    """The step within a radius to where the linearised requirements hold at the least cost, and the merit there.
+    """Step within a radius to the least cost at which the linearised requirements hold, and the merit there.
 
-    Requirements that were linearised at refused trials hold too, such as those of another corner of the tolerances. At
-    the trial itself they may fall no shorter than it does, where a requirement bends the other way.
+    Requirements linearised at refused trials must hold too, such as those of another corner of the tolerances, but at
+    the trial itself only up to its own slack, since a requirement may curve the other way.
     """
     x = trial.place[problem.free]
     below = [np.maximum(t.slack + t.slack_slope @ (trial.place - t.place), trial.slack) for t in refused]
@@ -352,7 +347,7 @@ def _step(
 
 
 def _augmented(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
-    """The same by optax's Adam on an augmented Lagrangian, whose multipliers are renewed eight times."""
+    """Find the best place by optax's Adam on an augmented Lagrangian, whose multipliers are updated eight times."""
     place, weight, rounds, steps = begin, 10.0, 8, 12
     multiplier, size = np.zeros(len(problem.wanted)), max(abs(problem.at(begin).cost), 1e-12)
     for turn in range(rounds):
@@ -384,15 +379,15 @@ SEARCHES: dict[str, Any] = {"slsqp": _programme, "augmented": _augmented}
 
 
 def _weights(slopes: np.ndarray, x: np.ndarray, objective: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lagrange multipliers of requirements with these slopes, and of the bounds, for a gradient of the objective."""
+    """Lagrange multipliers of requirements with these gradients, and of the bounds, for a gradient of the objective."""
     low, high = x < AT_BOUND, x > 1 - AT_BOUND
     found, _ = nnls(np.column_stack([*slopes, *np.diag(1.0 * low - high)]), objective)
     return found[: len(slopes)], found[len(slopes) :]
 
 
 def _conflict(problem: Problem, trial: Trial, names: list[str]) -> tuple[str, ...]:
-    """Requirements and bounds that together forbid a feasible design: at the least shortfall some weights make the
-    slopes of the worst requirements vanish, up to bounds."""
+    """Requirements and bounds that together prevent a feasible design: at the least violation, a weighted sum of the
+    gradients of the worst requirements vanishes, up to bounds."""
     worst = np.flatnonzero(trial.slack < trial.slack.min() + ACTIVE)
     slopes, x = trial.slack_slope[worst][:, problem.free], trial.place[problem.free]
     size = max(float(np.abs(slopes).max()), 1e-12)
@@ -403,8 +398,8 @@ def _conflict(problem: Problem, trial: Trial, names: list[str]) -> tuple[str, ..
 
 
 def _budget(problem: Problem, trial: Trial) -> list[Budget]:
-    """How wide each tolerance may be while the others stay: foreseen at first order from the slacks that are left at
-    the worst corners, then solved for at the corners, and less wide until all requirements hold there."""
+    """Admissible width of each tolerance with the others fixed: estimated at first order from the slacks at the worst
+    corners, then solved for there, and reduced until all requirements hold."""
     rows, space, tolerance = [], problem.space, problem.tolerance
     for i, name in enumerate(space.names):
         if name not in tolerance:
@@ -427,7 +422,6 @@ def _budget(problem: Problem, trial: Trial) -> list[Budget]:
 
 
 def _described(problem: Problem, best: np.ndarray, checked: Checked | None) -> Design:
-    """All that is known of the best place."""
     space, wanted = problem.space, problem.wanted
     trial, own, x = problem.at(best), problem.at(space.place), best[problem.free]
     names = np.array(space.names)[problem.free].tolist()

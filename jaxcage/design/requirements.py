@@ -1,4 +1,4 @@
-"""What is required of a design over its operating range, what the design costs, and tolerances of manufacture."""
+"""Requirements on a design over its operating range, its cost, and manufacturing tolerances."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -19,11 +19,11 @@ class Requirements:
 
     - `margin`: least distance of both ends of the operating range from the nearest edge of the stable range, per cent
         of the speed at that end.
-    - `decay`: most revolutions in which a small disturbance falls to 1/e.
+    - `decay`: largest number of revolutions in which a small disturbance decays to 1/e.
     - `film`: least distance of cage and land [m].
-    - `land_force`: largest force of the land on the cage in calm motion [N]; 0: they do not touch.
+    - `land_force`: largest force of the land on the cage in calm motion [N]; 0 forbids contact.
     - `balance`: largest balance grade G, eccentricity times the largest cage speed [mm/s].
-    - `drag`: largest mean power to shear the film [W].
+    - `drag`: largest mean power lost by shear of the film [W].
     """
 
     margin: float = 10.0
@@ -44,8 +44,8 @@ class Requirements:
 
 
 class Requirement(NamedTuple):
-    """One limit: its name, the value it concerns, the limit, whether values must be above (1) or below (-1) it, its
-    unit, and the difference that counts as 1."""
+    """One limit: its name, the quantity it concerns, the limit, 1 for a lower or -1 for an upper one, its unit, and the
+    difference that gives a slack of 1."""
 
     name: str
     of: str
@@ -55,12 +55,12 @@ class Requirement(NamedTuple):
     size: float
 
     def slack(self, value: Value) -> tuple[float, Float[np.ndarray, " n"]]:
-        """Distance of a value from the limit, negative where it is broken, over `size`; and its derivatives."""
+        """Slack of a value, its distance from the limit over `size`, negative if violated; and its gradient."""
         return self.sign * (value.value - self.limit) / self.size, self.sign * value.slope / self.size
 
 
 def listed(keep: Requirements, model: Any) -> list[Requirement]:
-    """The limits one by one; those of a land need a cage in its guide."""
+    """List of the limits; those on the land need a cage in its guide."""
     found = [
         Requirement("margin at the lower end", "lower margin", keep.margin, 1.0, "%", 10.0),
         Requirement("margin at the upper end", "upper margin", keep.margin, 1.0, "%", 10.0),
@@ -84,7 +84,7 @@ def listed(keep: Requirements, model: Any) -> list[Requirement]:
 
 
 def balance_grade(space: DesignSpace, operating: tuple[float, float], place: np.ndarray) -> Value:
-    """Balance grade of a design at its largest speed [mm/s]."""
+    """Balance grade [mm/s] of a design at the highest operating speed."""
     high = operating[1]
     slope = 1e3 * high * space.span * (np.array(space.names) == "eccentricity")
     return Value(1e3 * high * float(parameters(space.model(place))["eccentricity"]), slope, high * 30 / np.pi)
@@ -95,8 +95,8 @@ def balance_grade(space: DesignSpace, operating: tuple[float, float], place: np.
 
 @dataclasses.dataclass(frozen=True)
 class Price:
-    """Cost of accuracy in one parameter: `amount` at the value `at` [SI], in proportion to (value/at)^exponent, which
-    is negative where small values are dear."""
+    """Cost of accuracy in one parameter: `amount` at the value `at` [SI], in proportion to (value/at)^exponent; a
+    negative exponent makes small values expensive."""
 
     amount: float
     at: float
@@ -104,13 +104,13 @@ class Price:
 
 
 COSTS: Mapping[str, Price] = {"guidance_gap": Price(1.0, 0.45e-3), "eccentricity": Price(1.0, 23e-6)}
-"""The cage of the paper's case 1a costs 2: one part for turning cage and rib to their gap, one for balancing. Both
-fall with the reciprocal of the value, a common form of tolerance costs. A default to be replaced by a shop's own."""
+"""Default prices, to be replaced by one's own: the cage of the paper's case 1a costs 2, one part for turning cage and
+rib to their gap, one for balancing. Both are proportional to 1/value, a common form of tolerance costs."""
 Cost = Callable[[Any], Any] | Mapping[str, Price]
 
 
 def cost_function(cost: Cost | None, model: Any) -> Callable[[Any], Array]:
-    """The cost of a design as a function of it that JAX differentiates.
+    """Cost of a design as a differentiable function of it.
 
     **Raises:** `ValueError` for prices of parameters that the model does not have.
     """
@@ -131,7 +131,7 @@ def cost_function(cost: Cost | None, model: Any) -> Callable[[Any], Array]:
 
 
 class Tolerance(NamedTuple):
-    """Smallest and largest made value [SI]: beside the nominal one or, if `absolute`, whatever that is."""
+    """Smallest and largest manufactured value [SI], as deviations from the nominal value unless `absolute`."""
 
     lower: float
     upper: float
@@ -139,21 +139,21 @@ class Tolerance(NamedTuple):
 
     @classmethod
     def balanced(cls, grade: float, speed: float) -> "Tolerance":
-        """An eccentricity that balancing to a grade G [mm/s] leaves at a cage speed [rad/s]: from 0 to e = G/speed."""
+        """Eccentricity left by balancing to a grade G [mm/s] at a cage speed [rad/s]: from 0 to e = G/speed."""
         return cls(0.0, 1e-3 * grade / speed, absolute=True)
 
     def times(self, factor: float) -> "Tolerance":
-        """A tolerance so many times as wide."""
+        """Tolerance wider by a factor."""
         return self._replace(lower=factor * self.lower, upper=factor * self.upper)
 
     def ends(self, value: float) -> tuple[float, float]:
-        """Smallest and largest made value [SI] of a nominal one."""
+        """Smallest and largest manufactured value [SI] for a nominal one."""
         return (self.lower, self.upper) if self.absolute else (value + self.lower, value + self.upper)
 
 
 class Budget(NamedTuple):
-    """How wide one tolerance may be while the others stay: `factor` times its `width` [SI]. `limit` is the requirement,
-    or the edge that is lost, which does not let it be wider; empty if nothing limits it."""
+    """Admissible width of one tolerance with the others fixed: `factor` times its `width` [SI]. `limit` names the
+    requirement, or the lost edge, that prevents more; empty if there is none."""
 
     name: str
     width: float
@@ -162,10 +162,8 @@ class Budget(NamedTuple):
 
 
 def widened(model: Any, vary: Bounds, tolerance: Mapping[str, Tolerance]) -> dict[str, tuple[float, float]]:
-    """Bounds of what varies, and of what does not vary but scatters: enough room around it.
-
-    **Raises:** `ValueError` for tolerances that make no sense.
-    """
+    """Bounds of the varied parameters, and room around those that only have a tolerance. **Raises:** `ValueError` for
+    inconsistent tolerances."""
     known, bounds = {n: float(x) for n, x in parameters(model).items()}, dict(vary)
     for name, each in tolerance.items():
         if name not in known:

@@ -1,9 +1,8 @@
-"""Slopes of values by parameters of the design, with standard errors, and what tolerances make of them.
+"""Derivatives of values by parameters of the design, with standard errors, and tolerance budgets.
 
-Slopes of statistics come from designs that are scattered around the given one and run from the same initial states.
-They come in pairs that mirror each other: half the difference of a pair holds no curvature, and least squares over all
-pairs gives the slopes, with errors that assume no law of the scatter: J. G. MacKinnon and H. White, J. Econometrics 29
-(1985) 305, HC3.
+Derivatives of statistics come from designs scattered around the given one in mirrored pairs and run from the same
+initial states. Half the difference of a pair is free of curvature; least squares over all pairs gives the derivatives,
+with errors that allow for any scatter (HC3: J. G. MacKinnon and H. White, J. Econometrics 29 (1985) 305).
 """
 
 import dataclasses
@@ -37,8 +36,8 @@ DESIGNS, SPREAD = 64, 0.05
 
 @dataclasses.dataclass(frozen=True)
 class Slopes:
-    """A value, and its change with relative changes of parameters, or of some that change together: derivatives by the
-    logarithm of each parameter [unit], and the covariance of value and derivatives, 0 where they are exact."""
+    """A value and its derivatives by the logarithms of parameters, or of several that change together [unit], with the
+    covariance of value and derivatives, 0 where they are exact."""
 
     name: str
     unit: str
@@ -49,7 +48,7 @@ class Slopes:
 
     @classmethod
     def of(cls, edge: "Sensitivity | Slopes") -> "Slopes":
-        """The slopes of an exact edge; the distance of its speed [rpm] to that by half the steps is its error."""
+        """Slopes of an exact edge; its error is the change of its speed [rpm] with half the number of steps."""
         if isinstance(edge, Slopes):
             return edge
         covariance = np.zeros((1 + len(edge.elasticity),) * 2)
@@ -64,21 +63,21 @@ class Slopes:
 
     @property
     def by_relative_change_error(self) -> Float[np.ndarray, " n"]:
-        """Standard error of each derivative."""
+        """Standard errors of the derivatives."""
         return np.sqrt(np.diag(self.covariance)[1:])
 
     @property
     def elasticity(self) -> Float[np.ndarray, " n"]:
-        """Relative change of the value by that of each parameter; NaN of a value that is 0."""
+        """Relative change of the value by that of each parameter; NaN if the value is 0."""
         return self.by_relative_change / (self.value or math.nan)
 
     @property
     def elasticity_error(self) -> Float[np.ndarray, " n"]:
-        """Standard error of each elasticity."""
+        """Standard errors of the elasticities."""
         return np.array([self.elasticity_of(name)[1] for name in self.directions])
 
     def change(self, *names: str) -> tuple[float, float]:
-        """Derivative when parameters change together, such as gap and eccentricity at a fixed ratio, and its error.
+        """Derivative, and its error, when parameters change together, such as gap and eccentricity at a fixed ratio.
 
         **Raises:** `ValueError` for a parameter without a derivative.
         """
@@ -86,7 +85,7 @@ class Slopes:
         return float(chosen @ self.by_relative_change), _deviation(chosen, self.covariance[1:, 1:])
 
     def elasticity_of(self, *names: str) -> tuple[float, float]:
-        """The same as a relative change of the value."""
+        """Elasticity, and its error, when parameters change together."""
         (by, _), value = self.change(*names), self.value or math.nan
         weight = np.append(-by / value, self._chosen(names)) / value
         return by / value, _deviation(weight, self.covariance)
@@ -111,8 +110,8 @@ def _deviation(weight: np.ndarray, covariance: np.ndarray) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class StatisticGradient(Slopes):
-    """A statistic, the mean over all designs and initial states, with its slopes; the mean of the last block of the
-    runs less that of the first, NaN of one block; and the share of the scatter of the pairs that the slopes explain."""
+    """Slopes of a statistic, the mean over all designs and initial states; `drift`, the last block's mean minus the
+    first's, NaN for one block; `explained`, the share of the scatter of the pairs due to the slopes."""
 
     drift: float
     drift_error: float
@@ -120,14 +119,14 @@ class StatisticGradient(Slopes):
 
     @property
     def settled(self) -> bool:
-        """True if first and last block differ by at most twice their error, or by less than a hundredth."""
+        """True if the drift is at most twice its error, or 1 % of the value."""
         return abs(self.drift) <= max(2 * self.drift_error, 0.01 * abs(self.value))
 
 
 @dataclasses.dataclass(frozen=True)
 class MeanGradient:
-    """Gradients of statistics around a design with some values [SI]: pairs of designs that were run to their ends,
-    designs that failed, which are left out with their partners, and lanes that are `inaccurate`, which count."""
+    """Gradients of statistics around a design with some values [SI]: `pairs` of designs that finished, designs that
+    `failed`, which are left out with their partners, and `inaccurate` lanes, which are included."""
 
     statistics: dict[str, StatisticGradient]
     values: dict[str, float]
@@ -136,7 +135,7 @@ class MeanGradient:
     inaccurate: int
 
     def slope(self, statistic: str, parameter: str) -> tuple[float, float]:
-        """Derivative by one parameter that changes alone [unit of the statistic per SI unit], with its error."""
+        """Derivative by one parameter alone [unit of the statistic per SI unit], with its error."""
         slope, error = self.statistics[statistic].change(parameter)
         return slope / self.values[parameter], error / abs(self.values[parameter])
 
@@ -158,20 +157,20 @@ def mean_gradient(
 ) -> MeanGradient:
     """Gradients of statistics by parameters of the design, with standard errors.
 
-    **Arguments:** design; how designs are run, in two blocks to see a drift; names, or statistics by name;
+    **Arguments:** design; settings of the runs, in two blocks to see a drift; statistics, by name or as a mapping;
 
     - `directions`: parameters that are not 0; those joined by `+` change by the same factor.
-    - `designs`: number of designs, even; each parameter is moved up in half of them and down in the others, by half
-        of `spread` to all of it. Errors fall with the root of their number, and with a larger spread.
+    - `designs`: number of designs, even; each parameter is moved up in half of them and down in the others, by half of
+        `spread` to all of it. Errors fall with the root of their number, and with a larger spread.
     - `spread`: relative half width of the box of designs, above 0 and at most 0.3. Finer structure is smoothed away;
-        the slope is off by at most a sixth of spread^2 times the third derivative.
+        the error of the slope is at most a sixth of spread^2 times the third derivative.
 
-    **Returns:** `MeanGradient`. Standard errors are those of the designs' scatter around the fitted slopes: chaos,
-    motions that coexist, and curvature of third order are in them. The largest exponent need not depend smoothly on the
-    design: its slope is the mean slope over the box of designs.
+    **Returns:** `MeanGradient`. Standard errors come from the scatter of the designs around the fit, and include chaos,
+    coexisting motions and third-order curvature. Slopes of the largest exponent, which need not be smooth, are means
+    over the box.
 
-    **Raises:** `ValueError` for parameters that are unknown or 0, a box of designs that leaves a parameter's range,
-    counts that are impossible, too few designs for the directions; if too many of them fail.
+    **Raises:** `ValueError` for parameters that are unknown or 0, a box beyond a parameter's range, impossible counts,
+    and too few designs that finish.
     """
     require_at_least(0, seed=seed)
     chosen = statistics_of(model, statistics)
@@ -198,10 +197,7 @@ def mean_gradient(
 
 
 def moved_parameters(model: AbstractForcedSystem, names: Sequence[str], argument: str) -> dict[str, float]:
-    """Parameters [SI] that are moved by a part of their values.
-
-    **Raises:** `ValueError` for none, and those that are unknown, 0 or named twice.
-    """
+    """Values [SI] of parameters to vary. **Raises:** `ValueError` for none, or one that is unknown, 0 or repeated."""
     known = parameters(model)
     if not names:
         raise ArgumentError(argument, said="must hold at least one parameter, but it is empty.")
@@ -220,14 +216,14 @@ def moved_designs(
     moved: Float[np.ndarray, "designs n"],
     directions: Sequence[str] | None = None,
 ) -> list[AbstractForcedSystem]:
-    """Designs with relative changes of parameters; those joined by + in a direction change together."""
+    """Designs with relative changes of parameters; those joined by + change together."""
     names = directions or tuple(values)
     changed = lambda row: {n: values[n] * (1 + by) for d, by in zip(names, row, strict=True) for n in d.split("+")}
     return [replace(model, **changed(row)) for row in moved.tolist()]
 
 
 def _moves(pairs: int, directions: int, seed: int) -> Float[np.ndarray, "pairs directions"]:
-    """Places in the box, half way out or further: as many plus as minus in each column, in no order; of full rank."""
+    """Random changes of size 0.5 to 1, half of them positive in each column, in random order; of full rank."""
     rng, even = np.random.default_rng(seed), np.resize([1.0, -1.0], pairs)
     while True:
         found = np.stack([rng.permutation(even) * rng.uniform(0.5, 1.0, pairs) for _ in range(directions)], axis=-1)
@@ -242,11 +238,10 @@ def gradient_of_pairs(
     moved: Float[np.ndarray, "pairs n"],
     blocks: Float[np.ndarray, "2 pairs blocks"],
 ) -> StatisticGradient:
-    """Slopes of a statistic by least squares, from designs in pairs that mirror each other.
+    """Slopes of a statistic by least squares, from mirrored pairs of designs.
 
     **Arguments:** name and unit of the statistic; names of the directions; relative changes of the first design of each
-    pair, those of the second being the opposite; the statistic of the first designs, and of the second, in each block
-    of the runs.
+    pair, those of the second being the opposite; the statistic of the first and of the second designs in each block.
     """
     both = blocks.mean(axis=-1)
     half = (both[0] - both[1]) / 2
@@ -265,8 +260,8 @@ def gradient_of_pairs(
 
 @dataclasses.dataclass(frozen=True)
 class ToleranceBudget:
-    """Scatter of an edge or a statistic that the scatter of parameters causes, to first order: standard `deviation` due
-    to each parameter alone, or to several that change together, and its standard `error` [unit]."""
+    """First-order scatter of an edge or a statistic due to that of parameters: standard `deviation` for each parameter
+    alone, or for several that change together, and its standard `error` [unit]."""
 
     name: str
     unit: str
@@ -276,27 +271,26 @@ class ToleranceBudget:
 
     @property
     def total(self) -> float:
-        """Standard deviation due to all of them, taken as independent."""
+        """Standard deviation due to all parameters, taken as independent."""
         return math.hypot(*self.deviation.values())
 
     @property
     def unclear(self) -> tuple[str, ...]:
-        """Parameters whose deviation has an error, and is within twice of it."""
+        """Parameters whose deviation is at most twice its error, if it has one."""
         return tuple(name for name, x in self.deviation.items() if x <= 2 * self.error[name] > 0)
 
     def __str__(self) -> str:
         order = sorted(self.deviation.items(), key=lambda item: -item[1])
-        total = self.total or 1.0  # without any scatter, nothing is a part of it
+        total = self.total or 1.0  # avoids 0/0 without any scatter
         rows = [f"  {n:<24} ±{d:.3g} {self.unit}, {100 * (d / total) ** 2:.0f} % of the variance" for n, d in order]
         head = f"{self.name} {self.value:.6g} {self.unit}: ±{1.96 * self.total:.3g} {self.unit} (95 %)"
         return "\n".join([head, *rows])
 
 
 def tolerance_budget(of: Sensitivity | Slopes, deviation: Mapping[str, float]) -> ToleranceBudget:
-    """Scatter of an edge from its exact derivatives, or of a statistic from its slopes.
+    """First-order scatter of an edge from its exact derivatives, or of a statistic from its slopes.
 
-    **Arguments:** edge or statistic; standard deviation of each parameter relative to its value (a tolerance of ±t,
-    evenly used, has t/sqrt(3)).
+    **Arguments:** edge or statistic; standard deviation of each parameter over its value (t/sqrt(3) for a uniform ±t).
 
     **Raises:** `ValueError` for a parameter without a derivative, or a negative deviation.
     """

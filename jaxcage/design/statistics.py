@@ -1,7 +1,7 @@
-"""Statistics of designs, read off one sweep of all of them: chaotic speeds, quantities of the model, land loads.
+"""Statistics of designs from one sweep of all of them: chaotic speeds, quantities of the model, land loads.
 
 Every design is run at the same speeds with the same settings, and two designs are compared by runs that no search has
-used. Chaotic motion is not differentiated: the derivative of a trajectory grows like e^(lambda n), whatever its means.
+used. Chaotic trajectories are not differentiated: their derivatives grow like e^(lambda n), whatever the means do.
 """
 
 import dataclasses
@@ -31,37 +31,37 @@ CAGE_PARAMETERS = (
     *("guidance_gap", "pocket_clearance", "land_width", "eccentricity"),
     *("cage_mass", "cage_inertia", "pocket_stiffness", "inner_land_diameter"),
 )
-"""Parameters of a whole bearing that a design of its cage may change: load, speed and oil stay as they are."""
+"""Parameters of a whole bearing that a design of its cage may change; load, speed and oil are fixed."""
 BALANCE, OBJECTIVE, EXPONENT = "balance_grade_mm_per_s", "objective", "exponent"
 IMPULSES, WEAR = ("pocket_impulse_N_s", "land_impulse_N_s"), ("pocket_wear_mm3_per_h", "land_wear_mm3_per_h")
 STATISTICS = ("cage_slip", *IMPULSES, *WEAR, "friction_power_W")
-"""Quantities of a whole bearing that answer to its design."""
+"""Quantities of a whole bearing that depend on its design."""
 FORCES = ("pocket_force_peak_N", "land_force_peak_N")
 COMPARED = (*STATISTICS, *FORCES, BALANCE)
-"""Statistics of a whole bearing that are shown before and after."""
+"""Statistics of a whole bearing that are compared before and after a search."""
 TERMS: Mapping[str, tuple[str, ...]] = {
     **{"wear": ("+".join(WEAR),), "force": FORCES, "impulse": IMPULSES},
     **{"power": ("friction_power_W",), "slip": ("cage_slip",), "balance": (BALANCE,)},
 }
-"""Terms of the objective of a whole bearing: statistics relative to their present values; of two each counts half."""
+"""Terms of the objective of a whole bearing: statistics over their present values; two in one term count half each."""
 BEARING_MEASURES = {name: name for name in COMPARED[:-1]} | {n: TERMS[n][0] for n in ("wear", "power", "slip")}
 """Statistic of a whole bearing by the name of a measure."""
 LEAST_SLIP, LEAST_SHARE = 1e-3, 0.01
-"""A slip below this, and wear below that of this share of the cage's weight, are next to nothing."""
+"""Slip that is negligible, and share of the cage's weight under which wear is negligible."""
 SOFTNESS = 0.02
 """Half width of the smooth step of the largest exponent that counts chaotic speeds [1/revolution]."""
 SPREAD = 0.6
-"""Part of the clearance over which initial states of a cage are drawn."""
+"""Fraction of the clearance over which initial states of a cage are drawn."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Runs:
-    """Settings by which designs are run to be measured."""
+    """Settings of the runs from which statistics of designs are computed."""
 
     speeds: Speeds
-    """Ascending speeds [rad/s], of a whole bearing its shaft's."""
+    """Ascending speeds [rad/s], for a whole bearing those of its shaft."""
     initial_states: Any = 1
-    """Number of the model's own initial states, or initial states with which every design begins."""
+    """Number of the model's own initial states, or the initial states of every design."""
     discard: int = 150
     revolutions: int = 100
     blocks: int = 1
@@ -69,7 +69,7 @@ class Runs:
     tolerance: float | None = None
     method: AbstractMethod | None = None
     seed: int | None = None
-    """Seed by which `initial_states` initial states are drawn in place of the model's own."""
+    """Seed for `initial_states` random initial states in place of the model's own."""
     progress: Progress | None = None
     keep: int = 1
     settled: int = 0
@@ -81,13 +81,13 @@ class Runs:
 
     @classmethod
     def of_bearing(cls, speeds: Speeds, initial_states: Any = 4, discard: int = 10, revolutions: int = 20, **more: Any):
-        """Runs of a whole bearing in two blocks, from drawn positions of its cage; peaks are the largest in a block."""
+        """Runs of a whole bearing in two blocks, from random positions of its cage; peaks are maxima of a block."""
         usual = {"blocks": 2, "exponents": 0, "tolerance": 1e-4, "seed": 0}
         return cls(speeds, initial_states, discard, revolutions, **usual | more)
 
     def fresh(self, number: int = 1, initial_states: int = 8) -> "Runs":
-        """Runs for a check: other drawn initial states and other speeds of the range, twice as many, with twice as many
-        revolutions left out and a tenth of the tolerance. Each `number` from 1 on draws anew."""
+        """Independent runs for a check: other random initial states, twice as many speeds elsewhere in the range, twice
+        as many discarded revolutions, and a tenth of the tolerance. Each `number` from 1 on gives another draw."""
         speeds, seed = self.speed, (self.seed or 0) + number
         if (n := 2 * speeds.size) > 2:
             share = (np.arange(n) + np.random.default_rng(seed).uniform(size=n)) / n
@@ -104,7 +104,7 @@ class Runs:
         return np.atleast_1d(np.asarray(self.speeds, dtype=float))
 
     def run(self, models: Models) -> xr.Dataset:
-        """The sweep of some designs."""
+        """Sweep of some designs."""
         names = ("discard", "revolutions", "blocks", "exponents", "tolerance", "method", "keep", "settled")
         settings = {name: getattr(self, name) for name in names}
         initial_states = (
@@ -122,11 +122,11 @@ class Runs:
 def drawn_states(
     model: AbstractForcedSystem, speed: Float[np.ndarray, " speeds"], count: int, seed: int
 ) -> Float[np.ndarray, "speeds count dim"]:
-    """Initial states drawn within the clearance; of a whole bearing, its cage is drawn and its rollers roll."""
+    """Random initial states within the clearance; for a whole bearing, random cage positions with rolling rollers."""
     if model.samples > 1:
         return np.asarray(_rolling_states(model, jnp.asarray(speed), jnp.asarray(drawn_places(count, seed))))
     size = SPREAD * np.array([[float(x) for x in model.scale(s)] for s in speed.tolist()])
-    size[:, size.shape[1] // 2 :] *= 0.3  # velocities, of the clearance times the speed
+    size[:, size.shape[1] // 2 :] *= 0.3  # velocities, relative to clearance times speed
     return size[:, None] * np.random.default_rng(seed).uniform(-1, 1, (count, size.shape[1]))
 
 
@@ -138,26 +138,26 @@ def _rolling_states(model: Any, speeds: Array, places: Array) -> Float[Array, "s
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Statistic:
-    """A number of designs that is read off their sweep."""
+    """Scalar statistic of designs, computed from one sweep of all of them."""
 
     unit: str
     samples: Callable[[Models, xr.Dataset], Any]
-    """Function of designs and their sweep. It returns numbers of the shape (designs, speeds, initial states, blocks),
-    and the mean of those of a design is its value."""
+    """Function of designs and their sweep that returns an array (designs, speeds, initial states, blocks); the mean
+    over all but the first axis gives the value of each design."""
 
     def values(self, runs: Runs) -> Callable[[Models], Float[np.ndarray, " designs"]]:
         """Function that runs designs and returns the value of each; NaN where a lane failed."""
         return lambda models: self.samples(models, runs.run(models)).mean(axis=(1, 2, 3))
 
     def blocks(self, runs: Runs) -> Callable[[Models], Float[np.ndarray, "designs blocks"]]:
-        """The same for each block of the runs."""
+        """Function that runs designs and returns the value of each in each block."""
         return lambda models: self.samples(models, runs.run(models)).mean(axis=(1, 2))
 
 
 def chaotic_width(first_rpm: float, last_rpm: float, price: float = 0.0) -> Statistic:
-    """Width of the chaotic speeds between two [rpm], counted at the speeds of the runs, and `price` times the cost.
+    """Width of the chaotic speeds between two [rpm], counted at the speeds of the runs, plus `price` times the cost.
 
-    At each speed a smooth step of the largest exponent counts, between 0 and 1. A lane that failed counts as chaotic.
+    Each speed counts between 0 and 1, by a smooth step of the largest exponent. Failed lanes count as chaotic.
     """
 
     def samples(models: Models, found: xr.Dataset) -> np.ndarray:
@@ -170,8 +170,8 @@ def chaotic_width(first_rpm: float, last_rpm: float, price: float = 0.0) -> Stat
 
 
 def statistic(model: AbstractForcedSystem, name: str) -> Statistic:
-    """The statistic of a name: a quantity that the model reports, the largest `exponent`, the balance grade G of
-    ISO 21940-11, or the sum of several names that are joined by +; in `before_and_after` a load of a cage's land, too.
+    """Statistic by name: a quantity that the model reports, the largest `exponent`, the balance grade G of ISO
+    21940-11, or the sum of names joined by +; in `before_and_after` also a load of a cage's land.
 
     **Raises:** `ValueError` for an unknown name.
     """
@@ -200,12 +200,11 @@ def statistics_of(model: AbstractForcedSystem, given: Sequence[str] | Mapping[st
 
 
 def _cage_speed(model: Any, speed: np.ndarray) -> np.ndarray:
-    """Speeds of the cage [rad/s] at speeds of the model."""
     return np.array([float(model.turning_speed(v)) for v in speed.tolist()])
 
 
 def _negligible(model: Any, name: str, speed: np.ndarray) -> float:
-    """Value that the cage's weight causes: as a force, over a revolution, rubbing with a hundredth of it."""
+    """Negligible value, due to the cage's weight: as a force, its impulse per revolution, or rubbing with 1 % of it."""
     weight, turning = float(model.cage_mass * model.gravity), float(np.mean(np.abs(_cage_speed(model, speed))))
     if "wear" in name:
         return float(1e9 * 3600 * model.wear.volume(LEAST_SHARE * weight * turning * float(model.land_radius)))
@@ -215,12 +214,13 @@ def _negligible(model: Any, name: str, speed: np.ndarray) -> float:
 
 
 def bearing_objective(model: AbstractForcedSystem, runs: Runs, prices: Mapping[str, float]) -> Statistic:
-    """Mean of wear, forces, impulses, friction power, slip and balance of a whole bearing by their prices, each over
-    its present value or, if that is next to nothing, over what the cage's weight would cause: 1 for the given bearing.
+    """Weighted mean of wear, forces, impulses, friction power, slip and balance of a whole bearing, each over its
+    present value or, if that is negligible, over what the cage's weight would cause: 1 for the given bearing.
 
-    **Arguments:** the bearing as it is; how designs are run; prices of the `TERMS` by name.
+    **Arguments:** the given bearing; settings of the runs; weights of the `TERMS` by name.
 
-    **Raises:** `ValueError` for unknown terms, prices that are negative or all 0, and a bearing that fails in each run.
+    **Raises:** `ValueError` for unknown terms, weights that are negative or all 0, and a bearing that fails in all
+    runs.
     """
     if wrong := [name for name in prices if name not in TERMS]:
         raise ArgumentError("prices", said=f"must name some of {', '.join(TERMS)}, but has '{wrong[0]}'.")
@@ -242,8 +242,8 @@ def bearing_objective(model: AbstractForcedSystem, runs: Runs, prices: Mapping[s
 
 @dataclasses.dataclass(frozen=True)
 class BeforeAfter:
-    """A statistic of two designs from the same initial states, and its change, with standard errors from the scatter of
-    runs and of their differences; NaN of a single one."""
+    """Statistic of two designs from the same initial states, and its change, with standard errors from the scatter of
+    runs and of their differences; NaN for a single one."""
 
     name: str
     unit: str
@@ -266,13 +266,13 @@ def before_and_after(
     runs: Runs,
     statistics: Sequence[str] | Mapping[str, Statistic] = COMPARED,
 ) -> tuple[list[BeforeAfter], int]:
-    """Statistics of two designs, from the same initial states.
+    """Compare statistics of two designs from the same initial states.
 
-    **Arguments:** designs; how to run them, best `Runs.fresh` of those of the search; names of statistics, or
-    statistics by name.
+    **Arguments:** designs; settings of the runs, best `Runs.fresh` of those of the search; statistics, by name or as a
+    mapping.
 
-    **Returns:** a row for each statistic; the number of lanes that failed, which are left out together with those of
-    the other design at the same speed from the same initial state.
+    **Returns:** a row for each statistic; the number of failed lanes, which are left out together with those of the
+    other design at the same speed from the same initial state.
     """
     pair, rows = [before, after], []
     found = runs.run(pair)
@@ -290,6 +290,6 @@ def before_and_after(
 
 
 def mean_and_error(x: Float[np.ndarray, " n"]) -> tuple[float, float]:
-    """Mean of independent numbers and its standard error; NaN of too few."""
+    """Mean of independent numbers and its standard error; NaN for too few."""
     mean = float(x.mean()) if x.size else math.nan
     return mean, float(x.std(ddof=1) / math.sqrt(x.size)) if x.size > 1 else math.nan

@@ -1,7 +1,7 @@
-"""Search for a better design within bounds by a Gaussian process, for values that have noise and no slope.
+"""Search for a better design within bounds by a Gaussian process, for noisy values without derivatives.
 
-Each design of a batch is the best of one sample drawn from the process (Thompson sampling), among places in a region
-about the best design so far, which grows while designs become better and shrinks while they do not (D. Eriksson et al.,
+Each design of a batch is the best of one sample drawn from the process (Thompson sampling), within a trust region
+around the best design so far, which grows when designs improve and shrinks when they do not (D. Eriksson et al.,
 Scalable Global Optimization via Local Bayesian Optimization, NeurIPS 2019).
 """
 
@@ -21,26 +21,26 @@ from .design_space import Bounds, DesignSpace, Models, Places
 
 
 AT_BOUND = 0.01
-"""Distance from a bound within which a parameter is at the bound, as a part of the bounds' distance."""
+"""Distance from a bound, relative to the span, within which a parameter counts as at the bound."""
 CANDIDATES = 512
-"""Places among which a sample has its best."""
+"""Number of candidate places at which a sample is minimised."""
 FIRST, SMALLEST = 0.6, 0.02
-"""Sizes of the region, as parts of the distance between the bounds. One that has become too small begins again."""
+"""First and smallest size of the trust region, relative to the spans; below the smallest it starts again."""
 LENGTH, NOISE = 0.7, 0.05
-"""First guess of the process: its correlation length in each parameter, and the variance of its noise."""
+"""First guess of the process: correlation length in each parameter, and variance of the noise."""
 AMONG = 4
 """Number of the best designs that are compared again at the end."""
 OFFSET = 5e-3
-"""Part of the first value that is added to all of them, so that the logarithm of a small one has no cliff."""
+"""Offset before taking logarithms, relative to the first value, so that small values do not dominate."""
 
 Values = Callable[[Models], Float[np.ndarray, " designs"]]
-"""Function that returns the value of each design, to be made small; NaN of a design without a value."""
+"""Function that returns the value of each design, to be minimised; NaN for a design without a value."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Optimum:
-    """The best design of a search with the parameters that were varied [SI]; those that ended at a bound, which chose
-    there in place of the objective; the best value of each batch. It is not `changed` if no other design was better."""
+    """Best design of a search: varied parameters `values` [SI]; those `at_bound`, where the bound decides instead of
+    the objective; `history`, the best value of each batch; `changed`, False if no design was better."""
 
     model: AbstractForcedSystem
     values: dict[str, float]
@@ -66,12 +66,12 @@ def surrogate_search(
     seed: int = 0,
     report: Callable[[int, int], None] | None = None,
 ) -> Optimum:
-    """Make the values of designs small by changing some parameters.
+    """Minimise a noisy value of designs by changing some parameters.
 
-    **Arguments:** design; bounds [SI] by parameter name, between which the design lies; function of a list of designs
-    that returns their values; the same by other or longer runs, by which the best few designs and the given one are
-    compared again, since the least of many values with noise is lower than the truth; batches of designs, of which the
-    first lie all over the bounds, the given design among them; seed; called with batches done and of all.
+    **Arguments:** design; bounds [SI] by parameter name, which contain the design; function of a list of designs that
+    returns their values; `confirm`, the same with other or longer runs, by which the best few designs and the given one
+    are compared again, since the least of many noisy values is biased; number and size of batches, of which the first
+    cover the bounds and include the given design; seed; function called with the batches done and all.
 
     **Raises:** `ValueError` for unknown parameters, bounds that do not ascend or do not hold the design, no batch, and
     batches of fewer than 2 designs.
@@ -105,7 +105,7 @@ def surrogate_search(
 
 
 class SurrogateSearch:
-    """A search that is asked for places and told the values there; its places follow from the values."""
+    """Search by ask and tell: `ask` proposes places, `tell` takes the values there."""
 
     def __init__(self, start: Float[np.ndarray, " n"], batch: int, seed: int):
         """**Arguments:** place of the given design; places of a batch; seed."""
@@ -117,7 +117,7 @@ class SurrogateSearch:
         self.region = FIRST
 
     def ask(self) -> Places:
-        """The next batch."""
+        """Propose the next batch of places."""
         if len(self.places) < len(self.first):
             return self.first[len(self.places) :][: self.batch]
         process, noise = _fitted(self.places, _standardised(self.values))
@@ -132,8 +132,8 @@ class SurrogateSearch:
         return places[chosen]
 
     def _candidates(self, lengths: Float[np.ndarray, " n"]) -> Places:
-        """Places in the region about the best design, wide in parameters that do little; half of their parameters are
-        as in the best design."""
+        """Places in the trust region, which is wider in parameters of little effect; each keeps about half of the
+        parameters of the best design."""
         middle = self.places[int(np.argmin(_known(self.values)))]
         half = 0.5 * self.region * np.clip(lengths / np.exp(np.mean(np.log(lengths))), 0.3, 3.0)
         low, high = np.clip(middle - half, 0, 1), np.clip(middle + half, 0, 1)
@@ -143,7 +143,7 @@ class SurrogateSearch:
         return np.where(moved, places, middle)
 
     def tell(self, places: Places, values: Float[np.ndarray, " designs"]) -> None:
-        """Take the values of designs; NaN for a design without a value."""
+        """Take the values at these places; NaN for a design without a value."""
         before = np.min(_known(self.values), initial=np.inf)
         self.places, self.values = np.vstack([self.places, places]), np.append(self.values, values)
         if len(self.places) > len(self.first):
@@ -153,7 +153,7 @@ class SurrogateSearch:
 
 
 def _known(values: np.ndarray) -> np.ndarray:
-    """Values, with one worse than all others for designs without a value."""
+    """Values, with NaN replaced by a value worse than all others."""
     fine = np.isfinite(values)
     worst = np.max(values, where=fine, initial=-np.inf)
     return np.where(fine, values, worst + abs(worst) + 1.0 if fine.any() else 0.0)
@@ -168,7 +168,7 @@ def _standardised(values: np.ndarray) -> np.ndarray:
 
 
 def _fitted(places: np.ndarray, values: np.ndarray) -> tuple[Any, float]:
-    """The process with a length for each parameter, and the variance of its noise."""
+    """Process with a length for each parameter, fitted, and the variance of its noise."""
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor, kernels  # takes a second to load
 

@@ -1,8 +1,8 @@
-"""Edges of lasting chaos that no bifurcation explains, with their gradients and error bars, and widths of zones.
+"""Edges of lasting chaos that no bifurcation explains, with gradients and error bars, and widths of zones.
 
-At such an edge the mean life of chaos passes the horizon. It is never differentiated along a chaotic trajectory: many
-lanes, each at its own speed and of its own design near the edge, leave chaos at a rate whose logarithm is linear in
-speed and parameters; the edge is where that rate is one escape in a horizon, and its slopes follow from the two.
+At such an edge the mean life of chaos equals the horizon. No chaotic trajectory is differentiated: many lanes, each at
+its own speed and with its own design near the edge, leave chaos at a rate whose logarithm is linear in speed and
+parameters. The edge is where the rate is one escape per horizon; ratios of the slopes give its derivatives.
 """
 
 import dataclasses
@@ -28,23 +28,23 @@ from .slopes import Slopes, moved_designs, moved_parameters
 NAMES = ("guidance_gap", "eccentricity")
 DESIGNS = 64
 ROUNDS = 4
-"""Times that lanes are spread, about the edge as it is known by then."""
+"""Number of rounds of lanes, spread around the current estimate of the edge."""
 SPREAD = 0.02
 """Relative standard deviation of the parameters among the lanes."""
 REACH = 2.0
-"""Lanes are spread over speeds with mean lives of e^-REACH to e^REACH horizons, as far as the last round tells."""
+"""Lanes are spread over speeds with mean lives of e^-REACH to e^REACH horizons, as the last round estimates."""
 DISCARD, OBSERVED = 100, 300
-"""Revolutions left out, and observed; lanes that are calm after these are not followed."""
+"""Revolutions discarded, and observed; lanes that are calm after these are not followed."""
 LIKELY = 0.001
-"""Probability below which the law of escapes does not fit."""
+"""p-value below which the law of escapes is rejected."""
 CERTAIN = 3.0
-"""Standard errors of an edge that must fit into the window."""
+"""Number of standard errors of an edge that must fit into the window."""
 
 
 @dataclasses.dataclass(frozen=True)
 class LastingEdge(Slopes):
-    """Speed [rpm] at which the mean life of chaos passes the horizon, and its slopes; middle and half width of the
-    speeds of the last round; change of the logarithm of the escape rate with speed [1/rpm]."""
+    """Speed [rpm] at which the mean life of chaos equals the horizon, and its slopes; middle and half width of the
+    speeds of the last round; slope of the logarithm of the escape rate over speed [1/rpm]."""
 
     horizon: int
     window_rpm: tuple[float, float]
@@ -72,13 +72,13 @@ def lasting_edge(
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
 ) -> LastingEdge:
-    """Solve for an edge of lasting chaos and its elasticities, by survival regression.
+    """Estimate an edge of lasting chaos and its elasticities by survival regression.
 
-    **Arguments:** design; speed of the edge and its uncertainty, as a sweep gives them; parameters, each of which costs
-    no more, but makes all answers less certain; designs of each of four rounds, each at a speed of its own, from all
+    **Arguments:** design; speed of the edge and its uncertainty [rpm], as from a sweep; parameters, of which more cost
+    no more runs, but make all results less certain; designs of each of four rounds, each at its own speed, from all
     initial states of the model; mean life of chaos at the edge [revolutions]; seed; method and progress as in `sweep`.
 
-    **Returns:** `LastingEdge`; its `status` says where the numbers should not be used.
+    **Returns:** `LastingEdge`, whose `status` says if the numbers should not be used.
 
     **Raises:** `ValueError` for parameters that are unknown or 0, a window that is not positive, a horizon within the
     revolutions that every lane runs, and too few escapes.
@@ -93,7 +93,7 @@ def lasting_edge(
     edge, window, elasticity = float(rpm), float(within_rpm), np.zeros(len(names))
     speed, change, times = np.empty(0), np.empty((0, len(names))), np.empty(0)
     found = None
-    for _ in range(ROUNDS):  # all rounds count in the end
+    for _ in range(ROUNDS):  # each fit includes all rounds so far
         moved = rng.normal(size=(designs, len(names))).clip(-2, 2) * SPREAD
         at = (edge + window * rng.uniform(-1, 1, designs)) * (1 + moved @ elasticity)
         new, end = _escapes(moved_designs(model, base, moved), at, run, progress)
@@ -120,7 +120,7 @@ def lasting_edges(model: CageModel, zone: Zone, **options: object) -> dict[str, 
 def _escapes(
     designs: Models, rpm: Float[np.ndarray, " designs"], run: Run, progress: Progress | None
 ) -> tuple[Float[np.ndarray, "designs initial_states"], int]:
-    """Revolutions after which the lanes of each design are calm; and revolutions to which they were followed."""
+    """Revolutions after which the lanes of each design are calm, and the horizon up to which they were followed."""
     found = run_lanes(Plan.one_speed_each(designs, rpm * math.pi / 30), run, progress)
     return found["escape"].values, found.attrs["horizon"]
 
@@ -128,14 +128,13 @@ def _escapes(
 def _fitted(
     rpm: Any, change: Any, times: Any, about: tuple[float, float], horizon: int, names: tuple[str, ...]
 ) -> LastingEdge:
-    """The edge by a law of escapes whose logarithm is a square of the speed, or linear where that is not steep."""
+    """Edge by an escape rate whose logarithm is quadratic in speed, or linear where the slope is too small."""
     scale = np.maximum(np.std(change, axis=0), 1e-12)
     edge, window = about
     u = (rpm - edge) / window
 
     def solved(beta: Array) -> tuple[Array, Array]:
-        """Speed and its slopes, and the slope of the logarithm, where log rate = a + b u + c u^2 + ... is that of one
-        escape in a horizon, at the root that is nearest to 0."""
+        """Speed and its slopes, and the slope of log rate = a + b u + c u^2 + ..., at its root nearest to 0."""
         a, b = beta[0] + math.log(horizon), beta[1]
         c = beta[2] if beta.size > 2 + len(names) else 0.0
         at = -2 * a / (b + jnp.sign(b) * jnp.sqrt(b * b - 4 * a * c))
@@ -146,7 +145,7 @@ def _fitted(
         fit = hazard(times, horizon, np.column_stack([*powers, change / scale]), block=LIFE_BLOCK, t0=DISCARD)
         beta = jnp.asarray(fit.coefficients)
         (found, steep), (jacobian, _) = solved(beta), jax.jacfwd(solved)(beta)
-        if abs(steep) > abs(fit.coefficients[1]) / 2:  # false for NaN; near the vertex of a square there is no edge
+        if abs(steep) > abs(fit.coefficients[1]) / 2:  # false for NaN; near the vertex of the parabola there is no edge
             break
     covariance = np.asarray(jacobian) @ fit.covariance @ np.asarray(jacobian).T
     slopes = float(found[0]), names, np.asarray(found[1:]), covariance
@@ -154,16 +153,16 @@ def _fitted(
 
 
 SolvedEdge = LastingEdge | Sensitivity
-"""An edge with its slopes: by survival regression, or exact."""
+"""Edge with its slopes: by survival regression, or exact."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ZoneWidth(Slopes):
-    """Width of a zone [rpm], of lasting chaos or an unstable range, exit less onset, and its slopes.
+    """Width [rpm] of a zone of lasting chaos or of an unstable range, exit minus onset, and its slopes.
 
-    Each edge has an error of its own; the gradient of an exact edge has none. A zone that is cut by the range is open:
-    its width is NaN, and its slopes are those of its one edge. It is trusted if all edges that it has are converged;
-    `status` says `converged`, `open: ...`, or which edge should not be used, and why.
+    Errors of the edges are independent; the gradient of an exact edge has none. A zone cut by the range is `open`: its
+    width is NaN, and its slopes are those of its one edge. It is `trusted` if all its edges are converged; `status` is
+    `converged`, `open: ...`, or says which edge should not be used, and why.
     """
 
     open: bool
@@ -172,12 +171,12 @@ class ZoneWidth(Slopes):
 
 
 def zone_width(edges: Mapping[str, SolvedEdge], zone: int = 1) -> ZoneWidth:
-    """Width of a zone and its change with the parameters of all its edges, with standard errors.
+    """Width of a zone and its derivatives by the parameters common to its edges, with standard errors.
 
-    **Arguments:** edges by name, `zone 1 onset` and the like, as `jaxcage.orbits.sensitivities` has them, or `onset`
-    and `exit`, as `lasting_edges` does; number of the zone.
+    **Arguments:** edges by name, `zone 1 onset` and the like, as from `jaxcage.orbits.sensitivities`, or `onset` and
+    `exit`, as from `lasting_edges`; number of the zone.
 
-    **Raises:** `ValueError` for a zone of which no edge is known.
+    **Raises:** `ValueError` for a zone without a known edge.
     """
     both = {end: edges.get(f"zone {zone} {end}", edges.get(end)) for end in ("onset", "exit")}
     solved = {end: edge for end, edge in both.items() if edge is not None}

@@ -1,13 +1,13 @@
-"""Cages of which some values are known within ranges only: chances of chaos, and ranges narrowed by measurements.
+"""Cages with parameters known only within ranges: chances of chaos, and ranges narrowed by measurements.
 
-Each draw is a design with values from the ranges; it runs once at every speed, from the conventional start. At a speed
-the draws are independent, so that their chaotic share has the error bar of a binomial count; speeds are not.
+Each draw is a design with values from the ranges; it runs once at every speed, from the conventional initial state.
+Draws are independent at one speed, so that their chaotic share has a binomial error bar, but not from speed to speed.
 
 Ranges are narrowed by approximate Bayesian computation with rejection (S. A. Sisson, Y. Fan and M. A. Beaumont,
-Handbook of Approximate Bayesian Computation (2018)): even draws from the ranges run at the measured speeds, and a draw
-is accepted if every measurement is met within its tolerance. Where few are, the ranges close around the best of them,
-with a margin, and are drawn from again. A box holds less than what was learned: values that only matter together stay
-wide. What is left out may have held the truth.
+Handbook of Approximate Bayesian Computation (2018)): uniform draws from the ranges run at the measured speeds, and a
+draw is accepted if it meets every measurement within its tolerance. If few are, the ranges close around the best draws,
+with a margin, and are drawn from again. A box loses correlations: values that only matter together stay wide. The true
+values may lie outside the narrowed ranges.
 """
 
 import dataclasses
@@ -32,34 +32,34 @@ from .statistics import Runs
 
 
 REVOLUTIONS = 100
-"""Revolutions left out, and observed: one lane is an example of a chance, and need not be known to three digits."""
+"""Revolutions discarded, and observed; few suffice, since one draw is only a sample of a chance."""
 SETTLED = 64
-"""Revolutions after which a draw that is periodic is not run any further, which are three in five."""
+"""Revolutions after which periodic draws, three in five, are stopped."""
 ERROR = 1e-2
-"""Error of a revolution [clearances] up to which a lane counts; with the default, a quarter of the draws fail."""
+"""Largest accepted error of a revolution [clearances]; with the default, a quarter of the draws would fail."""
 RARE = 0.05
-"""Chance below which a speed is called calm, and above one less which it is called chaotic."""
+"""Chance up to which a speed is called calm; from 1 - RARE on it is called chaotic."""
 FEWEST = 29
-"""Draws without which nothing is called calm: if 10 % were chaotic, none of so many would be once in 20 times."""
+"""Least number of draws for a verdict: at a chance of 10 %, this many contain no chaotic one in 5 % of cases."""
 CONFIDENCE = 0.95
 BINS = 4
-"""Parts of a range whose chances are compared, to tell how much an unknown explains."""
+"""Number of parts of a range whose chances are compared, to estimate how much an unknown explains."""
 KEPT = 0.25
-"""Share of the draws of a stage around which the ranges close; with as many accepted the stage is the last."""
+"""Share of the draws of a stage around which the ranges close; if as many are accepted, the stage is the last."""
 FAR = 5.0
-"""Largest count of a miss [tolerances], also of a cage that rattles and should not. The larger of two misses counts
-more, so that a tight tolerance tells near draws from far ones."""
+"""Saturation of a miss [tolerances], and the miss of a cage that wrongly rattles or is calm. Saturation is gradual, so
+that a tight tolerance still distinguishes near from far draws."""
 FEW = 8
-"""Accepted draws without which even the last stage closes around the best ones, met or not."""
+"""Number of accepted draws below which even the last stage closes around the best ones, accepted or not."""
 WHOLE = 0.9
-"""Share of a range above which it is left whole."""
+"""Share of a range above which it is not narrowed."""
 
 
 def _run_draws(
     model: CageModel, unknowns: Sequence[Unknown], place: np.ndarray, speeds: Any, method: Any, **more: Any
 ) -> tuple[list[CageModel], xr.Dataset]:
     """Designs with the values at `place` in the ranges, and their sweep, each from its own conventional initial state:
-    a state in which the cage of one design rests on its rib would press that of another into it."""
+    the cage of one design, at rest on its rib, would penetrate that of another."""
     models = []
     for row in place:
         values = {name: float(u.range.at(p)) for u, p in zip(unknowns, row, strict=True) for name in u.names}
@@ -81,7 +81,7 @@ Verdict = Literal["calm", "chaotic", "calm as computed", "chaotic as computed", 
 
 
 class Clue(NamedTuple):
-    """Share of the variance of the chaotic share that is due to an unknown alone, and `source`, how to measure it."""
+    """Share of the variance of the chaotic share that one unknown alone explains, and `source`, how to measure it."""
 
     label: str
     share: float
@@ -90,8 +90,8 @@ class Clue(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Ensemble:
-    """Chaos of designs that are drawn from ranges: unknowns with `sources`, how to measure each, and their SI `units`;
-    place of each draw in each range, 0 to 1; speeds [rad/s]; where a draw is chaotic while observed, or failed."""
+    """Chaos of designs drawn from ranges: unknowns with their `sources`, how to measure each, and SI `units`; place of
+    each draw in each range, 0 to 1; speeds [rad/s]; True where a draw is chaotic while observed, or failed."""
 
     unknowns: tuple[Unknown, ...]
     sources: tuple[str, ...]
@@ -105,12 +105,12 @@ class Ensemble:
 
     @property
     def rpm(self) -> Float[np.ndarray, " speeds"]:
-        """Cage speeds in revolutions per minute."""
+        """Cage speeds [rpm]."""
         return self.speed * 30 / np.pi
 
     @property
     def counts(self) -> tuple[np.ndarray, np.ndarray]:
-        """Chaotic draws, and draws that finished, at each speed."""
+        """Numbers of chaotic and of finished draws at each speed."""
         return np.sum(self.chaotic & ~self.failed, axis=0), np.sum(~self.failed, axis=0)
 
     @property
@@ -121,24 +121,24 @@ class Ensemble:
 
     @property
     def interval(self) -> tuple[Float[np.ndarray, " speeds"], Float[np.ndarray, " speeds"]]:
-        """Bounds of the chance with 95 % confidence, by Clopper and Pearson: the lower one as if all that failed were
-        calm, the upper one as if all were chaotic."""
+        """95 % bounds of the chance (Clopper and Pearson), with failed draws counted as calm in the lower and as
+        chaotic in the upper one."""
         (chaotic, of), draws = self.counts, len(self.place)
         return binomial_interval(chaotic, draws)[0], binomial_interval(chaotic + draws - of, draws)[1]
 
     @property
     def verdict(self) -> list[Verdict]:
-        """Meaning of the chance at each speed, see `verdict_of`."""
+        """Verdict at each speed, see `verdict_of`."""
         return [verdict_of(int(k), int(n), len(self.place)) for k, n in zip(*self.counts, strict=True)]
 
     @property
     def undecided(self) -> Bool[np.ndarray, " speeds"]:
-        """Speeds at which the ranges are too wide to decide."""
+        """True for speeds at which the ranges are too wide to decide."""
         return np.array([v == "not decided" for v in self.verdict], dtype=bool)
 
     def clues(self, which: Bool[np.ndarray, " speeds"] | None = None) -> list[Clue]:
-        """Influence of each unknown on the chaotic share of the speeds `which`, by default all undecided ones, the
-        largest first; empty where there is nothing to decide."""
+        """Influence of each unknown on the chaotic share at the speeds `which`, by default all undecided ones, the
+        largest first; empty if there is nothing to decide."""
         chosen = self.undecided if which is None else which
         y = np.mean(self.chaotic[:, chosen], axis=1) if np.any(chosen) else np.zeros(len(self.chaotic))
         if np.ptp(y) == 0:
@@ -147,17 +147,17 @@ class Ensemble:
         return sorted((Clue(u.label, explained(at, y), of) for u, at, of in each), key=lambda clue: -clue.share)
 
     def between(self, low_rpm: float, high_rpm: float) -> Bool[np.ndarray, " speeds"]:
-        """Speeds in a range, or the one that is nearest to it."""
+        """True for the speeds in a range or, if there are none, for the one nearest to its lower end."""
         inside = (self.rpm >= low_rpm) & (self.rpm <= high_rpm)
         return inside if np.any(inside) else np.arange(self.rpm.size) == np.argmin(np.abs(self.rpm - low_rpm))
 
 
 def verdict_of(chaotic: int, finished: int, draws: int) -> Verdict:
-    """Meaning of `chaotic` draws among `finished` of `draws`.
+    """Verdict from the numbers of `chaotic`, `finished` and all `draws`.
 
-    `calm` and `chaotic` hold whatever the draws that failed would do: at most 5 %, or at least 95 %, of all draws are
-    chaotic then. `calm as computed` and `chaotic as computed` are about the draws that finished; those that failed are
-    often the ones that hit the land hardest, and others drawn in their place would not be like them.
+    `calm` and `chaotic` hold whatever the failed draws would do: at most 5 %, or at least 95 %, of all draws are
+    chaotic. `calm as computed` and `chaotic as computed` concern the finished draws only; failed ones often hit the
+    land hardest, and other draws in their place would not represent them.
     """
     if finished < FEWEST:
         return "too few draws"
@@ -173,7 +173,7 @@ def verdict_of(chaotic: int, finished: int, draws: int) -> Verdict:
 def binomial_interval(
     hits: np.ndarray | Sequence[int] | int, of: np.ndarray | Sequence[int] | int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Clopper and Pearson's bounds of a share, from `hits` among `of`."""
+    """95 % bounds (Clopper and Pearson) of a share, from `hits` among `of`."""
     from scipy.stats import beta  # takes half a second to load
 
     k, n, tail = np.asarray(hits, dtype=float), np.asarray(of, dtype=float), (1 - CONFIDENCE) / 2
@@ -183,7 +183,7 @@ def binomial_interval(
 
 
 def explained(place: np.ndarray, y: np.ndarray) -> float:
-    """Share of the variance of y between quarters of `place`, less what chance alone would put there."""
+    """Share of the variance of y between quarters of `place`, less what chance alone would give."""
     parts = np.array_split(y[np.argsort(place)], BINS)
     between = sum(part.size * (part.mean() - y.mean()) ** 2 for part in parts)
     within = sum(((part - part.mean()) ** 2).sum() for part in parts)
@@ -205,10 +205,10 @@ def ensemble(
 ) -> Ensemble:
     """Run `draws` designs, spread evenly over the ranges, over speed.
 
-    **Arguments:** design; what is unknown of it; ascending speeds [rad/s]; number and seed of the draws (scrambled
-    Sobol points); revolutions left out and observed; method; more as `Runs` takes it.
+    **Arguments:** design; its unknowns; ascending speeds [rad/s]; number and seed of the draws (scrambled Sobol
+    points); revolutions discarded and observed; method; more settings of `Runs`.
 
-    **Raises:** `ValueError` if nothing is unknown, nothing is drawn, or values from the ranges do not go together.
+    **Raises:** `ValueError` if nothing is unknown, nothing is drawn, or values from the ranges are not compatible.
     """
     _require_some(unknowns)
     require_at_least(1, draws=draws)
@@ -225,9 +225,9 @@ def ensemble(
 
 @dataclasses.dataclass(frozen=True)
 class Narrowed:
-    """Ranges that are narrowed by measurements: ends of each new range in the old one, 0 to 1, and the median of the
-    accepted draws; draws of the last stage that meet all measurements, of all that each stage has; stages; how far the
-    best draw is from each measurement, in tolerances."""
+    """Ranges narrowed by measurements: `lower` and `upper` ends of each new range in the old one, 0 to 1, and `middle`,
+    the median of the draws kept; draws `accepted` in the last stage, of `draws` in each; number of `stages`; distance
+    of the best draw from each measurement, in tolerances."""
 
     unknowns: tuple[Unknown, ...]
     lower: Float[np.ndarray, " unknowns"]
@@ -240,17 +240,17 @@ class Narrowed:
 
     @property
     def share(self) -> Float[np.ndarray, " unknowns"]:
-        """Share of each range that is left."""
+        """Width of each range relative to the old one."""
         return self.upper - self.lower
 
     @property
     def narrowed(self) -> Bool[np.ndarray, " unknowns"]:
-        """True for ranges that become shorter by more than a tenth."""
+        """True for ranges that shrink by more than 10 %."""
         return self.share < WHOLE
 
     @property
     def ranges(self) -> tuple[Range, ...]:
-        """New ranges; those that are not narrowed as they were."""
+        """New ranges; unchanged if they are not narrowed."""
         return tuple(
             Range(float(u.range.at(a)), float(u.range.at(b)), float(u.range.at(m))) if worth else u.range
             for u, a, b, m, worth in zip(self.unknowns, self.lower, self.upper, self.middle, self.narrowed, strict=True)
@@ -258,7 +258,7 @@ class Narrowed:
 
 
 Misses = Callable[[Float[np.ndarray, "draws unknowns"]], Float[np.ndarray, "draws measurements"]]
-"""Places in the ranges -> how far each draw is from each measurement, in tolerances."""
+"""Function of places in the ranges: distance of each draw from each measurement, in tolerances."""
 
 
 def narrow(
@@ -266,7 +266,7 @@ def narrow(
 ) -> Narrowed:
     """Close ranges around the draws that meet the measurements.
 
-    **Arguments:** ranges; function of places in them, such as `misses`, that tells how far draws are from the
+    **Arguments:** ranges; function of places in them, such as `misses`, that returns the distances of draws from the
     measurements; draws of each stage; largest number of stages; seed.
 
     **Raises:** `ValueError` if nothing is unknown, or for fewer than 16 draws.
@@ -293,8 +293,8 @@ def narrow(
 
 
 def _closed(place: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ends around these places, some distances of even draws beyond the outermost; a range of which they leave most
-    stays whole, since nothing was learned of it."""
+    """Bounds of these places, with a margin of twice their mean spacing and 2 % of the old range; a range that would
+    keep most of its width stays whole, since nothing was learned of it."""
     low, high = place.min(axis=0), place.max(axis=0)
     margin = 2.0 * (high - low) / (len(place) - 1) + 0.02 * (upper - lower)
     low, high = np.maximum(low - margin, lower), np.minimum(high + margin, upper)
@@ -311,8 +311,8 @@ def misses(
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
 ) -> Float[np.ndarray, "draws measurements"]:
-    """Distance of each draw from each measurement, in tolerances; NaN where it failed. A cage that is chaotic rattles:
-    its distance is 0 if that is right, else `FAR`."""
+    """Distance of each draw from each measurement, in tolerances; NaN where it failed. For the motions `rattles`
+    (chaos) and `calm` it is 0 if the draw agrees, else `FAR`."""
     rpm = np.unique([m.cage_rpm for m in measured])
     models, found = _run_draws(model, unknowns, place, rpm * np.pi / 30, method, progress=progress)
     size, order = motions(models, found, method=native(error=ERROR))

@@ -1,4 +1,4 @@
-"""Sobol indices: shares of the variance of a value over whole ranges of parameters, with intervals by the bootstrap."""
+"""Sobol indices: shares of the variance of a value over ranges of parameters, with bootstrap intervals."""
 
 import dataclasses
 import math
@@ -16,16 +16,16 @@ from .design_space import Bounds, DesignSpace, Models
 
 
 NARROW = 0.3
-"""Width of an interval [share of the variance] that is narrow enough to tell what matters from what does not."""
+"""Width of an interval [share of the variance] that is narrow enough to rank the parameters."""
 RESAMPLES, TAIL = 2000, 2.5
 """Samples of the bootstrap, and the percentage on each side of an interval."""
 
 
 @dataclasses.dataclass(frozen=True)
 class SobolIndices:
-    """Shares of a variance due to a parameter alone, and with all its interactions, with 95 % intervals by the
-    bootstrap; evaluations, and base samples. `scatter` is the share of the motion itself, by the blocks of each run: it
-    belongs to no parameter, and total indices contain it. Drift between the blocks counts as scatter."""
+    """First-order and total Sobol indices with 95 % bootstrap intervals; numbers of evaluations and base samples.
+    `scatter` is the share of the motion itself, from the blocks of each run: it belongs to no parameter, but total
+    indices contain it. Drift between the blocks counts as scatter."""
 
     first: dict[str, float]
     total: dict[str, float]
@@ -37,18 +37,19 @@ class SobolIndices:
 
     @property
     def doubtful(self) -> tuple[str, ...]:
-        """Parameters with an index whose interval lies outside 0 to 1, or is wider than the index and `NARROW`."""
+        """Parameters with an index whose interval lies outside 0 to 1, or is wider than the index and than `NARROW`."""
         rows = [(self.first, self.first_interval), (self.total, self.total_interval)]
         bad = lambda value, pair: not (pair[0] <= 1 and pair[1] >= 0 and pair[1] - pair[0] <= max(abs(value), NARROW))
         return tuple(n for n in self.first if any(bad(value[n], pair[n]) for value, pair in rows))
 
     @property
     def warning(self) -> str | None:
-        """Warning for indices with wide intervals, with the samples that should make them `NARROW`, since widths fall
-        with the root of their number; None if there are none."""
+        """Warning of wide intervals, with the number of samples that should make them `NARROW`; None if there are
+        none."""
         if not self.doubtful:
             return None
         widest = max(b - a for pairs in (self.first_interval, self.total_interval) for a, b in pairs.values())
+        # Widths fall with the root of the number of samples.
         wanted = max(2 * self.samples, 1 << math.ceil(math.log2(self.samples * max(widest / NARROW, 1.0) ** 2)))
         return (
             f"Too few samples to believe the indices of {', '.join(self.doubtful)}: shares of a variance lie between 0 "
@@ -73,12 +74,12 @@ def global_sensitivity(
     samples: int = 64,
     seed: int = 0,
 ) -> SobolIndices:
-    """Sobol indices of the values of designs, parameters drawn evenly between their bounds.
+    """Sobol indices of a value of designs, with parameters uniformly distributed between bounds.
 
     The estimators are (b) and (f) of table 2 in Saltelli et al., Comput. Phys. Commun. 181 (2010) 259. Indices of a
     parameter without any effect are 0.
 
-    **Arguments:** design; bounds [SI] by name; function of a list of designs that returns their values, or those from
+    **Arguments:** design; bounds [SI] by name; function of a list of designs that returns their values, or those of
     each block of their runs; base samples, a power of 2: samples (parameters + 2) designs are evaluated in one batch.
 
     **Raises:** `ValueError` for unknown parameters, samples that are no power of 2, or a design without a value.
@@ -97,7 +98,7 @@ def global_sensitivity(
     f = by_block.mean(axis=1).reshape(n + 2, samples)
 
     def shares(f: np.ndarray) -> np.ndarray:
-        """First and total indices of values at both sets of samples, and at the first with one column of the other."""
+        """First-order and total indices from values at both sample sets, and at the first with one column swapped."""
         variance = np.var(f[:2], axis=(0, -1))
         change = f[2:] - f[0]
         both = np.stack([np.mean(f[1] * change, axis=-1), 0.5 * np.mean(change**2, axis=-1)])

@@ -1,9 +1,9 @@
-"""Does a cage stay calm over an operating range, how certain is that, and what would change it?
+"""Verdict on an operating range: whether a cage stays calm, how certain that is, and what would change it.
 
-Two independent answers go together. The design at its best guess has a stable range of speed with exact edges: the
-distance of the operating range from these edges is its margin, and has exact derivatives. Values that are known within
-ranges only are drawn, and each draw is simulated over the range: the share of draws that are chaotic somewhere in it is
-a joint probability, with the error bar of a binomial count.
+Two independent results are combined. The best guess of the design has a stable range of speed with exact edges: the
+distance of the operating range from them is its margin, with exact derivatives. Unknown values are drawn from their
+ranges, and each draw is simulated over the operating range: the share of draws that are chaotic somewhere in it is a
+joint probability, with a binomial error bar.
 """
 
 import dataclasses
@@ -20,13 +20,13 @@ from .unknowns import Ensemble, binomial_interval, explained, verdict_of
 
 
 RANGE_SPEEDS = 32
-"""Speeds of the operating range at which draws are simulated."""
+"""Number of speeds of the operating range at which draws are simulated."""
 STEP = 0.1
-"""Relative change of a parameter whose effect is stated."""
+"""Relative change of a parameter for which effects are given."""
 SMALL = 0.02
-"""Effects below this part of the largest one are not listed."""
+"""Effects below this fraction of the largest one are not listed."""
 RESAMPLED = 400
-"""Bootstrap samples behind the error of an index."""
+"""Number of bootstrap samples for the error of an index."""
 TURNED = "drawing", "operating"
 """Kinds of parameters that a designer or a user of the bearing can change."""
 ENDS = "lower", "upper"
@@ -35,7 +35,8 @@ State = Literal["calm", "rattles", "not decided"]
 
 
 class RangeChance(NamedTuple):
-    """Draws that are chaotic at one or more speeds of a range, draws of which this is known, and all draws."""
+    """Numbers of draws that are chaotic at one or more speeds of a range, of those for which this is known, and of
+    all."""
 
     chaotic: int
     known: int
@@ -48,20 +49,20 @@ class RangeChance(NamedTuple):
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval of the calm share, whatever the draws do that failed."""
+        """95 % interval of the calm share, whatever the failed draws would do."""
         unknown = self.draws - self.known
         high = 1 - float(binomial_interval(self.chaotic, self.draws)[0])
         return 1 - float(binomial_interval(self.chaotic + unknown, self.draws)[1]), high
 
     @property
     def state(self) -> State:
-        """`calm` or `rattles` if at least 95 % of the draws agree."""
+        """`calm` or `rattles` if at least 95 % of the draws agree, else `not decided`."""
         found = verdict_of(self.chaotic, self.known, self.draws)
         return "calm" if found.startswith("calm") else "rattles" if found.startswith("chaotic") else "not decided"
 
 
 def range_chance(found: Ensemble, low_rpm: float, high_rpm: float) -> tuple[RangeChance, Bool[np.ndarray, " draws"]]:
-    """The chance that a draw is calm at all speeds of a range, and the draws that are chaotic somewhere in it."""
+    """Chance that a draw is calm at all speeds of a range [rpm], and True for the draws that are chaotic in it."""
     which = found.between(low_rpm, high_rpm)
     chaotic = np.any(found.chaotic[:, which] & ~found.failed[:, which], axis=1)
     known = chaotic | ~np.any(found.failed[:, which], axis=1)
@@ -69,8 +70,8 @@ def range_chance(found: Ensemble, low_rpm: float, high_rpm: float) -> tuple[Rang
 
 
 class Index(NamedTuple):
-    """First-order index of an unknown value: the share of the variance of the verdict that it explains by itself, with
-    its standard error; how to measure the value; chance of rattling in the lowest and highest quarter of its range."""
+    """First-order index of an unknown value: the share of the variance of the verdict that it explains alone, with its
+    standard error; how to measure it; chance of rattling in the lowest and highest quarter of its range."""
 
     label: str
     share: float
@@ -85,8 +86,7 @@ class Index(NamedTuple):
 
 
 def indices(found: Ensemble, chaotic: Bool[np.ndarray, " draws"]) -> list[Index]:
-    """First-order indices of all unknown values on whether a draw is chaotic somewhere in the range, the largest first;
-    empty if all draws agree."""
+    """First-order indices of all unknown values for chaos in the range, largest first; empty if all draws agree."""
     if np.all(chaotic == chaotic[0]):
         return []
     y, count = chaotic.astype(float), len(chaotic)
@@ -100,11 +100,11 @@ def indices(found: Ensemble, chaotic: Bool[np.ndarray, " draws"]) -> list[Index]
 
 @dataclasses.dataclass(frozen=True)
 class Margins:
-    """Distances of an operating range from the edges of the stable range, of the design at its best guess.
+    """Distances of an operating range from the edges of the stable range, for the best guess of a design.
 
-    `lower` and `upper` are in per cent of the speed at that end, with derivatives by the change of each parameter in
-    units of itself; `open` names the ends at which no edge was found within the search. `decay` is the number of
-    revolutions in which a small disturbance falls to 1/e at the worst speed, infinite if it does not.
+    `lower` and `upper` are in per cent of the speed at that end, with derivatives by relative changes of the
+    parameters. `decay` is the number of revolutions in which a small disturbance falls to 1/e at the worst speed, or
+    infinite.
     """
 
     lower: Value
@@ -121,7 +121,7 @@ class Margins:
 
     @property
     def least(self) -> tuple[str, Value]:
-        """The end of the range that is nearest to an edge, and its margin."""
+        """End of the range nearest to an edge, and its margin."""
         known = [end for end in ("lower", "upper") if end not in self.open] or ["upper"]
         end = min(known, key=lambda end: getattr(self, end).value)
         return end, getattr(self, end)
@@ -146,8 +146,8 @@ class Margins:
 
 
 class Change(NamedTuple):
-    """Effect of 10 % more (`up`) or less of a parameter, at first order: `gain` on the least margin and `other` on that
-    of the other end, per cent of speed. `limit` is the value at which the edge would reach the range [SI]."""
+    """First-order effect of 10 % more (`up`) or less of a parameter: `gain` of the least margin, and `other` of that at
+    the other end, per cent of speed. `limit` is the value at which the edge would reach the range [SI]."""
 
     name: str
     value: float

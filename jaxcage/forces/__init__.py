@@ -2,7 +2,7 @@
 
 | module       | responsibility                                                                        |
 |--------------|---------------------------------------------------------------------------------------|
-| `law`        | base classes of laws, the motion that they see, the clearance of the guide            |
+| `law`        | base classes of laws, the motion they depend on, the clearance of the guide           |
 | `film`       | short-bearing oil film of the rib lands, three film models, (25)-(28)                 |
 | `contact`    | line contact of the lands, with restitution                                           |
 | `support`    | springs, cubic stiffness, damping and cross-coupling, (16), (20); rigid or elastic rib |
@@ -66,4 +66,4 @@ from .support import ElasticRib as ElasticRib, RigidRib as RigidRib, Support as 
 
 
 LAWS: tuple[type[AbstractLaw], ...] = (RibFilm, LandContact, Support, SynchronousImpact, RollerPassImpact)
-"""The laws that a cage and its configuration file know, in the order in which forces are listed and added."""
+"""Built-in laws of a cage and its configuration file, in the order in which forces are listed and added."""

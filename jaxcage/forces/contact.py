@@ -1,4 +1,4 @@
-"""Land contact: beyond a given eccentricity ratio a line contact between cage and rib takes over from the film.
+"""Land contact: line contact between cage and rib beyond a given eccentricity ratio, in addition to the film.
 
 Force N = K p^(10/9) (1 + chi p'/v_0) on the penetration p, after Hunt and Crossley. The damping number chi follows from
 the coefficient of restitution e by the exact law of this model, ln[(1 + chi)/(1 - chi e)] = chi (1 + e), whatever the
@@ -16,7 +16,7 @@ from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion
 
 
 def _restitution_defect(s: Array, e: Array) -> Array:
-    """The restitution law over chi^2 (which removes its trivial double root), with chi = (1 - exp(-s))/e."""
+    """Restitution law over chi^2 (which removes its trivial double root), with chi = (1 - exp(-s))/e."""
     chi = -jnp.expm1(-s) / e
     small = jnp.abs(chi) < 1e-2
     safe, safe_s = jnp.where(small, 0.01, chi), jnp.where(small, -jnp.log1p(-0.01 * e), s)
@@ -26,16 +26,16 @@ def _restitution_defect(s: Array, e: Array) -> Array:
 
 
 def restitution_damping(restitution: Scalar) -> Array:
-    """Damping number chi of the Hunt-Crossley force that gives back `restitution` times the approach speed.
+    """Damping number chi of the Hunt-Crossley force for a coefficient of restitution.
 
-    **Arguments:** coefficient of restitution, in (0, 1].
+    **Arguments:** coefficient of restitution e, in (0, 1].
 
     **Returns:** chi >= 0, solving ln[(1 + chi)/(1 - chi e)] = chi (1 + e); chi = 0 at e = 1. Differentiable.
     """
     e = jnp.asarray(restitution, dtype=float)
     solver = optx.Bisection(rtol=1e-12, atol=1e-12, flip=False)  # the defect increases
     bounds = {"lower": -jnp.log1p(e / 2), "upper": jnp.array(60.0)}  # chi from -1/2 to nearly 1/e
-    # The bracket always holds the root: nothing to check or throw, which would put a host callback into every program.
+    # The bracket always contains the root; throwing would put a host callback into every program.
     root = optx.root_find(_restitution_defect, solver, jnp.array(0.5), e, bounds, max_steps=200, throw=False)
     s = root.value
     return jnp.asarray(-jnp.expm1(-s) / e)
@@ -52,7 +52,7 @@ def contact_force(penetration: Scalar, rate: Scalar, stiffness: Scalar, damping:
 
 
 class LandContact(AbstractLaw):
-    """The contact of the cage's guiding lands with the rib."""
+    """Contact of the cage's guiding lands with the rib."""
 
     law_name = "contact"
 
@@ -86,7 +86,6 @@ class LandContact(AbstractLaw):
     )
 
     def at(self, cage: GuidedCage, speed: Scalar) -> "ContactForce":
-        """The contact of `cage` with its guide."""
         return ContactForce(self.stiffness, restitution_damping(self.restitution) / self.approach_speed)
 
 
@@ -95,7 +94,7 @@ class ContactForce(AbstractForce):
 
     stiffness: Scalar
     damping: Scalar
-    """Hunt-Crossley number over the approach speed to which it belongs, chi/v_0 [s/m]."""
+    """Hunt-Crossley number over its approach speed, chi/v_0 [s/m]."""
 
     def force(self, motion: Motion) -> Force:
         at, c = motion.place, motion.land.clearance

@@ -1,6 +1,5 @@
-"""Elementary functions of the laws: regularised, so that Newton's method on orbits finds the derivatives it needs, and
-made of additions, multiplications and few roots, so that they run along SIMD lanes.
-"""
+"""Elementary functions of the force laws: smooth, so that Newton's method on orbits has the derivatives it needs, and
+made of additions, multiplications and few roots, so that they vectorise."""
 
 from typing import Any
 
@@ -51,13 +50,13 @@ def smooth_norm(x: Scalar, y: Scalar, length: Scalar) -> Array:
 
 
 def inverse_root(x: Scalar) -> Array:
-    """1/sqrt(x) for x > 0. XLA would make a call of 1/sqrt(x), and LLVM would not vectorise the kernel around it."""
+    """1/sqrt(x) for x > 0, in a form for which XLA emits no function call, which LLVM could not vectorise."""
     return jnp.sqrt(x) / x
 
 
 @jax.custom_jvp
 def _inverse_ninth_root(p: Array) -> Array:
-    """p^(-1/9) for p > 0, to rounding: a guess within 3 % from the bits of p, then three steps of third order."""
+    """p^(-1/9) for p > 0 to rounding: a guess within 3 % from the bits of p, then three third-order iterations."""
     bits = jax.lax.bitcast_convert_type(p, jnp.int64)
     ninth = (bits.astype(float) * (1 / 9)).astype(jnp.int64)
     root = jax.lax.bitcast_convert_type(0x4709D0369D036C00 - ninth, jnp.float64)
@@ -99,10 +98,8 @@ def _polynomial(coefficients: tuple[float, ...], z: Scalar) -> Scalar:
 
 
 def cos_sin(tau: Scalar) -> tuple[Scalar, Scalar]:
-    """Cosine and sine of tau [rad], to a unit in the last place of 1 for |tau| < 1e5.
-
-    Polynomials run along the lanes; the mathematics library is called once for every lane.
-    """
+    """Cosine and sine of tau [rad], to a unit in the last place of 1 for |tau| < 1e5, by polynomials, which vectorise
+    over lanes; the mathematics library would be called once per lane."""
     return _cos_sin(jnp.asarray(tau, dtype=float))
 
 

@@ -50,7 +50,7 @@ def film_scale(viscosity: Scalar, radius: Scalar, width: Scalar, clearance: Scal
 
 
 def half_circle_resistance(x: Scalar, y: Scalar, ux: Scalar, uy: Scalar) -> Resistance:
-    """M over the half circle centred on the unit vector u = (ux, uy), in closed form.
+    """Resistance matrix M over the half circle centred on the unit vector u = (ux, uy), in closed form.
 
     It is half the Hessian, with respect to a = r.u and b = r x u, of the Sommerfeld integral
     G = (2/D) (pi/2 + arctan(a/D)), D^2 = 1 - a^2 - b^2.
@@ -74,12 +74,12 @@ def half_circle_resistance(x: Scalar, y: Scalar, ux: Scalar, uy: Scalar) -> Resi
 
 
 def film_drive(x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar) -> Vector:
-    """P = 2 v - omega (-y, x): squeeze and entrainment, in clearances per second."""
+    """Film drive P = 2 v - omega (-y, x): squeeze and entrainment, in clearances per second."""
     return 2 * vx + omega * y, 2 * vy - omega * x
 
 
 def arc_centre(model: FilmModel, direction: Vector, drive: Vector, least: Scalar) -> Vector:
-    """Unit vector u to the middle of the half circle that carries pressure; (0, 0) for `full`, which has no such half.
+    """Unit vector u to the middle of the pressurised half circle; (0, 0) for `full`.
 
     **Arguments:** film model; direction of the position; drive P; a small drive that regularises the direction of P
     where P = 0.
@@ -94,13 +94,13 @@ def arc_centre(model: FilmModel, direction: Vector, drive: Vector, least: Scalar
 
 
 def film_resistance(model: FilmModel, x: Scalar, y: Scalar, direction: Vector, arc: Vector) -> Resistance:
-    """M of one of the three film models.
+    """Resistance matrix M of a film model.
 
     Over the whole circle it is isotropic I + radial r r^T. Over the half circle that trails the line of centres (alpha
-    from 0 to pi), as in (27), it is half of that and - skew (n r'^T + r' n^T) with r' = (-y, x).
+    from 0 to pi), as in (27), it is half of that minus skew (n r'^T + r' n^T) with r' = (-y, x).
 
     **Arguments:** film model; position (x, y) over clearance, and its direction n as a unit vector, regularised at the
-    centre, where the fixed arc loses it; the arc as from `arc_centre`.
+    centre, where the fixed arc is undefined; the arc as from `arc_centre`.
     """
     if model == "positive_pressure":
         return half_circle_resistance(x, y, *arc)
@@ -115,7 +115,7 @@ def film_resistance(model: FilmModel, x: Scalar, y: Scalar, direction: Vector, a
 
 
 class RibFilm(AbstractLaw):
-    """The oil film of the guiding lands: how many, how wide, and which film model."""
+    """Oil film of the guiding lands: their number and width, supply pressure and film model."""
 
     law_name = "film"
 
@@ -136,7 +136,6 @@ class RibFilm(AbstractLaw):
     )
 
     def at(self, cage: GuidedCage, speed: Scalar) -> "FilmForce":
-        """The film of `cage` in its guide."""
         c, radius, viscosity = cage.clearance, cage.land_radius, cage.lubricant.dynamic_viscosity
         return FilmForce(
             scale=self.n_lands * film_scale(viscosity, radius, self.land_width, c),
@@ -155,7 +154,7 @@ class FilmForce(AbstractForce):
     """R L p_0 of all lands [N]. The thrust of a uniform gauge pressure on the half circle centred on u is -2 R L p_0 u,
     the paper's last term of (27): +2 R L p_0 along +phi, since the fixed half is centred on -phi."""
     drag: Scalar
-    """2 pi mu R^3 L/c of all lands [N m s]: the torque per speed of a cage in the middle of its clearance."""
+    """2 pi mu R^3 L/c of all lands [N m s]: the torque per relative speed of a centred cage."""
     model: FilmModel = eqx.field(static=True)
 
     def force(self, motion: Motion) -> Force:

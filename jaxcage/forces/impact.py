@@ -72,19 +72,17 @@ class ImpactHistory(eqx.Module):
 
 
 def approach_speed(approach_ratio: Scalar, omega: Scalar, pocket_clearance: Scalar) -> Array:
-    """v_0 = kappa omega T [m/s]: ties the impact to the pocket clearance, as the paper's conclusion 2 says."""
+    """Approach speed v_0 = kappa omega T [m/s], set by the pocket clearance T as in the paper's conclusion 2."""
     return jnp.asarray(approach_ratio * omega * pocket_clearance)
 
 
 def impact_history(
     impact: PocketImpact, roller_mass: Scalar, v0: Scalar, duration: Scalar, samples: int = 512, substeps: int = 4
 ) -> ImpactHistory:
-    """Solve (14) from the touch of a roller that approaches at `v0`.
+    """Solve (14) from the first contact of a roller that approaches at `v0`.
 
     **Arguments:** oscillator; roller mass [kg]; approach speed [m/s]; duration [s]; number of samples on a uniform grid
     and of Tsit5 steps between two samples.
-
-    **Returns:** `ImpactHistory`.
     """
 
     def contact(d_w: Array, d_c: Array) -> Array:
@@ -115,7 +113,7 @@ def impact_history(
 
 
 class SynchronousImpact(AbstractLaw):
-    """The paper's (15): one horizontal force at cage frequency that grows as a power of speed.
+    """Synchronous impact (15) of the paper: a horizontal force at cage frequency that grows as a power of speed.
 
     f_x = Q [sin tau + sin(pi - tau)] cos(theta) = A sin tau, and f_y = 0 identically: only A = 2 Q cos(theta) matters,
     A(omega) = A_ref (omega/omega_ref)^n.
@@ -141,12 +139,11 @@ class SynchronousImpact(AbstractLaw):
     reference_speed: Scalar = parameter("rad/s", 1.0, 1e5, "speed to which the amplitude belongs", default=1000.0)
 
     def at(self, cage: GuidedCage, speed: Scalar) -> "SynchronousForce":
-        """The force at cage speed `speed` [rad/s]."""
         return SynchronousForce(self.amplitude * (speed / self.reference_speed) ** self.exponent)
 
 
 class SynchronousForce(AbstractForcing):
-    """One horizontal force at cage frequency."""
+    """Horizontal force at cage frequency."""
 
     amplitude: Scalar
 
@@ -155,7 +152,7 @@ class SynchronousForce(AbstractForcing):
 
 
 class RollerPassImpact(AbstractLaw):
-    """A pulse Q_cw(t) each time a roller enters or leaves the loaded zone, as a Fourier series."""
+    """Pulse Q_cw(t) each time a roller enters or leaves the loaded zone, as a Fourier series."""
 
     law_name = "impact"
     kind = "roller_pass"
@@ -167,7 +164,6 @@ class RollerPassImpact(AbstractLaw):
         return cage.bearing.n_rollers * self.harmonics
 
     def at(self, cage: GuidedCage, speed: Scalar) -> "RollerPassForce":
-        """The force at cage speed `speed` [rad/s]."""
         b, zone = cage.bearing, load_distribution(cage.bearing, cage.load)
         return pulse_train(self, speed, zone.half_angle, b.n_rollers, b.roller_mass, b.pocket_clearance)
 
@@ -177,15 +173,15 @@ def pulse_spectrum(
 ) -> tuple[Float[Array, " harmonics"], Float[Array, " harmonics"]]:
     """Cosine and sine coefficients [N] of the train of pulses that starts at tau = 0 and repeats every 2 pi / Z.
 
-    Pulses that last longer than the time between two rollers add up: summing shifted pulses and sampling the spectrum
-    of one pulse at the multiples of Z are the same thing (Poisson). Every bounce on the swinging bar is part of a
-    pulse. Coefficients are good to 1e-10 of the largest (1e-9 where it bounces ten times). They are NaN where 20 000
-    steps do not resolve a pulse: a bar that swings tens of thousands of radians, or waves as many, during one impact.
+    Overlapping pulses add up: the sum of shifted pulses equals the spectrum of one pulse sampled at the multiples of Z
+    (Poisson). A pulse includes every bounce on the swinging bar. Coefficients are accurate to 1e-10 of the largest
+    (1e-9 with ten bounces), and NaN where 20 000 steps do not resolve a pulse, i.e. if the bar or the highest harmonic
+    turns through tens of thousands of radians during one impact.
     """
     law = impact.oscillator
     v0 = approach_speed(law.approach_ratio, omega, pocket_clearance)
     moves = v0 > 0
-    v0 = jnp.where(moves, v0, 1.0)  # a roller without play does not hit, and its force has no spectrum to work out
+    v0 = jnp.where(moves, v0, 1.0)  # a roller without play does not hit: avoid NaN
     share = law.bar_mass / (roller_mass + law.bar_mass)
     mass = roller_mass * share
     unit = (mass / law.contact_stiffness) ** (9 / 19) * v0 ** (-1 / 19)
@@ -225,9 +221,7 @@ def pulse_train(
 
 class RollerPassForce(AbstractForcing):
     """Force of all roller passes by Fourier coefficients: the sum over k of a_k cos(k Z tau) + b_k sin(k Z tau) [N].
-
-    Each coefficient is a scalar of its own, as the kernels want them.
-    """
+    Each coefficient is a separate scalar, as the compiled kernels require."""
 
     a_x: tuple[Scalar, ...]
     b_x: tuple[Scalar, ...]
@@ -237,7 +231,7 @@ class RollerPassForce(AbstractForcing):
 
     def force(self, motion: Motion) -> Force:
         first, rise = cos_sin(self.n_rollers * motion.phase)
-        now, before = (1.0, 0.0), (first, -rise)  # cosine and sine of k Z tau, by the recurrence of Chebyshev
+        now, before = (1.0, 0.0), (first, -rise)  # cosine and sine of k Z tau, by Chebyshev's recurrence
         x = y = jnp.zeros(())
         for a_x, b_x, a_y, b_y in zip(self.a_x, self.b_x, self.a_y, self.b_y, strict=True):
             c, s = now

@@ -1,6 +1,4 @@
-"""Forces of the cage's own mass: its weight, y pointing up, and the centrifugal force of its mass centre, in the
-physical and in the printed reading.
-"""
+"""Weight of the cage (y points up), and centrifugal force of its mass centre, physical or as printed in the paper."""
 
 from typing import Literal
 
@@ -18,7 +16,7 @@ UnbalanceReading = Literal["physical", "as_printed"]
 def effective_eccentricity(
     reading: UnbalanceReading, eccentricity: Scalar, guidance_gap: Scalar, printed_unit: Scalar
 ) -> Array:
-    """Eccentricity [m] that enters the force.
+    """Eccentricity [m] that enters the unbalance force.
 
     `as_printed` takes (20) literally: 2 M rho omega^2 with rho = e/C_r read as a number of `printed_unit` (one
     millimetre): 4.44 e at a gap of 0.45 mm, 3.33 e at 0.60 mm.

@@ -1,8 +1,8 @@
-"""Laws of forces on the cage: what a law sees of its motion, and what it returns.
+"""Base classes of the force laws on the cage, and the motion on which forces depend.
 
-`AbstractLaw` holds the parameters of a force. Its method `at(cage, speed)` works out, once for all steps, whatever
-depends on the bearing and on the speed, and returns an `AbstractForce`, whose method `force(motion)` gives the force.
-A law without such constants, as a user writes it, is an `AbstractForce` from the beginning.
+`AbstractLaw` holds the parameters of a force. Its method `at(cage, speed)` evaluates, once for all steps, whatever
+depends on the bearing and on the speed, and returns an `AbstractForce`, whose method `force(motion)` gives the force. A
+user's law without such constants is an `AbstractForce` itself.
 """
 
 import abc
@@ -17,35 +17,35 @@ from .elementary import smooth_norm, smooth_plus
 Force = tuple[Scalar, Scalar, Scalar]
 """(F_x, F_y, moment) on the cage [N, N, N m], the moment about its centre and counter-clockwise.
 
-The speed of the cage is prescribed: moments do not change its motion. Times the
-speed they are the power that drives the cage: that of the film is the power that its shear costs.
+The speed of the cage is prescribed: moments do not change its motion, and moment times speed is the power that drives
+the cage, for the film the power lost by its shear.
 """
 
 
 class Place(NamedTuple):
-    """Position of the cage in its clearance circle, lengths over clearance."""
+    """Position of the cage in its clearance circle, lengths divided by the clearance."""
 
     x: Scalar
     y: Scalar
     vx: Scalar
-    """Velocities over clearance [1/s]."""
+    """Velocity over clearance [1/s]."""
     vy: Scalar
     eps: Scalar
     """Eccentricity ratio."""
     per_eps: Scalar
     nx: Scalar
-    """Line of centres: a unit vector, rounded off at the centre."""
+    """Unit vector along the line of centres, smoothed at the centre."""
     ny: Scalar
     gap: Scalar
     """Distance of eps from the onset of contact, negative before it."""
     excess: Scalar
-    """The same distance, smoothly cut off at 0."""
+    """`gap`, smoothly cut off at 0."""
 
 
 class Land(eqx.Module):
-    """The guide's clearance, and over it the lengths that keep its forces smooth.
+    """Clearance of the guide, and its smoothing lengths divided by the clearance.
 
-    Divisions and roots dominate the cost of a step: constants are inverted once, the eccentricity once.
+    Inverses are computed once, since divisions and roots dominate the cost of a step.
     """
 
     clearance: Scalar
@@ -56,7 +56,7 @@ class Land(eqx.Module):
     centre_width: Scalar
 
     def place(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> Place:
-        """Place of a cage whose centre is at (x, y) [m] and moves at (vx, vy) [m/s]."""
+        """`Place` of a cage whose centre is at (x, y) [m] and moves at (vx, vy) [m/s]."""
         per_c = self.per_clearance
         x, y, vx, vy = x * per_c, y * per_c, vx * per_c, vy * per_c
         eps = smooth_norm(x, y, self.centre_width)
@@ -69,21 +69,20 @@ class Motion(NamedTuple):
     """Motion of the cage, relative to the land that guides it."""
 
     phase: Scalar
-    """Angle of the cage [rad]; forces must repeat after every revolution."""
+    """Rotation angle of the cage [rad]; forces must have the period of one revolution."""
     x: Scalar
-    """Position of its centre [m]."""
+    """Position of the cage centre [m]."""
     y: Scalar
     vx: Scalar
-    """Velocity of its centre [m/s]."""
+    """Velocity of the cage centre [m/s]."""
     vy: Scalar
     cage_speed: Scalar
-    """Speed of rotation [rad/s]."""
+    """Rotation speed of the cage [rad/s]."""
     land_speed: Scalar
-    """Speed of rotation of the land [rad/s]: 0 for a rib of the ring that stands still."""
+    """Rotation speed of the land [rad/s]; 0 for a rib of the stationary ring."""
     shaft_speed: Scalar
-    """Speed of the shaft [rad/s] at which rollers without slip turn the cage at `cage_speed`."""
+    """Shaft speed [rad/s] at which rollers without slip turn the cage at `cage_speed`."""
     land: Land
-    """The guide's clearance."""
 
     @property
     def place(self) -> Place:
@@ -93,7 +92,7 @@ class Motion(NamedTuple):
 
 @runtime_checkable
 class GuidedCage(Protocol):
-    """What the laws read from a cage."""
+    """Attributes of a cage that force laws use."""
 
     bearing: Any
     lubricant: Any
@@ -109,29 +108,29 @@ class GuidedCage(Protocol):
 
 
 class AbstractLaw(eqx.Module):
-    """Parameters of a force on the cage.
+    """Base class for the parameters of a force on the cage.
 
-    Numbers of a law are fields: declared with `jaxcage.forces.parameter`, with unit, range and description; or plain
-    ones, `coefficient: float`, parameters as well but of unknown unit. What is no parameter is a static field.
+    Parameters are fields: declared with `jaxcage.forces.parameter`, with unit, range and description, or plain,
+    `coefficient: float`, with unknown unit. All other fields are static.
     """
 
     law_name: ClassVar[str] = ""
-    """Name of the law in `jaxcage.forces.LAWS`: its table in a configuration file, its attribute of a model, and its
-    force in results. Laws of a user have none and are named after their class."""
+    """Name of a built-in law (`jaxcage.forces.LAWS`): its table in a configuration file, its attribute of a model, and
+    its force in results. A user's law has none and goes by its class name."""
     kind: ClassVar[str] = ""
-    """`kind` in a configuration file that chooses between laws of one name."""
+    """`kind` in a configuration file, which selects between laws of the same name."""
 
     def highest_harmonic(self, cage: GuidedCage) -> int:
-        """The highest harmonic of the phase in the force, a static number: no step is longer than half its period."""
+        """Highest harmonic of the phase in the force, static: steps are at most half its period."""
         return 1
 
     @abc.abstractmethod
     def at(self, cage: GuidedCage, speed: Scalar) -> "AbstractForce":
-        """The force on `cage` at cage speed `speed` [rad/s]."""
+        """Force on `cage` at cage speed `speed` [rad/s]."""
 
 
 class AbstractForce(AbstractLaw):
-    """A force between land and cage: an elastic rib feels its opposite.
+    """Base class for a force between land and cage; an elastic rib receives the opposite force.
 
     !!! example
         class ViscousDrag(jc.forces.AbstractForce):
@@ -145,7 +144,7 @@ class AbstractForce(AbstractLaw):
 
     @property
     def harmonics(self) -> int:
-        """The highest harmonic of the phase in the force, 1 by default."""
+        """Highest harmonic of the phase in the force, 1 by default."""
         return 1
 
     def highest_harmonic(self, cage: GuidedCage) -> int:
@@ -156,8 +155,8 @@ class AbstractForce(AbstractLaw):
 
     @abc.abstractmethod
     def force(self, motion: Motion) -> Force:
-        """(F_x, F_y, moment) on the cage, scalars made with `jax.numpy` or plain arithmetic."""
+        """Return (F_x, F_y, moment) on the cage, scalars made with `jax.numpy` or plain arithmetic."""
 
 
 class AbstractForcing(AbstractForce):
-    """A force that depends on the phase alone; it does not react on the rib."""
+    """Base class for a force that depends on the phase alone and does not act on the rib."""

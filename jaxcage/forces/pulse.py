@@ -1,11 +1,11 @@
-"""Fourier integrals of the force of one impact, (14), whatever its width and however often the bar bounces.
+"""Fourier integrals of the force of one impact (14), for any pulse width and any number of bounces.
 
 In units of the contact's depth P, of v_0 and of P/v_0, with p = w^9 and dt = 9 w^8 ds, motion in contact is
     dw/ds = r,   dr/ds = 9 w^8 (-w^10 + kappa B),   dv/ds = -9 w^8 beta w^10,   dB/ds = 9 w^8 kappa (v - r)
-for the penetration p, its rate r, the roller's velocity v and kappa times the bar's position B: polynomials, so that
-motion and force are analytic in s up to the touch itself, where they go as t^(10/9) in time. Gauss collocation makes
-few steps of that; the last one of a contact runs in w instead of s and so ends at w = 0 (Hénon). While they are apart
-the roller flies and the bar swings, in closed form.
+for the penetration p, its rate r, the roller's velocity v and kappa times the bar's position B. These are polynomials:
+motion and force are analytic in s even at the instant of contact, where they vary as t^(10/9) in time, and Gauss
+collocation needs few steps. The last step of a contact uses w instead of s as its variable and so ends at w = 0
+(Hénon). Between contacts the motion of roller and bar has a closed form.
 """
 
 import functools
@@ -25,14 +25,14 @@ SWEEPS = 14
 """Fixed-point iterations in a step."""
 CONVERGED = 1e-13
 SMOOTH = 1e-9
-"""Largest last Legendre coefficient of a step; what follows from a step is as good as its square."""
+"""Largest allowed last Legendre coefficient of a step; results of the step are accurate to its square."""
 PHASE = 8.0
-"""Largest phase of the highest harmonic in a step [rad], in which time runs unevenly."""
+"""Largest phase of the highest harmonic in a step [rad]; time is nonlinear in the step's variable."""
 MOST_STEPS = 20_000
 
 
 def _collocation() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Weights of the integrals from 0 to each Gauss point of (0, 1) and to 1, and of the last Legendre coefficients."""
+    """Weights of the integrals from 0 to each Gauss point of (0, 1) and to 1, and of the last two Legendre terms."""
     x, w = np.polynomial.legendre.leggauss(NODES)
     eye = np.eye(NODES)
     values = np.stack([np.polynomial.legendre.legval(x, e) for e in eye])
@@ -46,7 +46,7 @@ INNER, WHOLE, LAST = _collocation()
 
 
 class _Motion(NamedTuple):
-    """Motion of roller and bar."""
+    """Motion of roller and bar, in the units above."""
 
     w: Array
     r: Array
@@ -67,8 +67,8 @@ class _State(NamedTuple):
 def pulse_integrals(share: Scalar, swing: Scalar, phase: Scalar, harmonics: int) -> Float[Array, "2 harmonics"]:
     """Integrals of q cos(k phase t) and q sin(k phase t) over one impact, k = 0 to `harmonics`.
 
-    **Arguments:** the bar's share beta = M_c/(M_w + M_c) of the mass; kappa, the bar's angular frequency, and the
-    `phase` of the first harmonic in a unit of time; the number of harmonics.
+    **Arguments:** the bar's share beta = M_c/(M_w + M_c) of the mass; `swing`, the bar's angular frequency kappa, and
+    the `phase` of the first harmonic in a unit of time; the number of harmonics.
 
     **Returns:** integrals in units of m v_0 with m = M_w beta, and of P/v_0 with P = (m v_0^2/K)^(9/19); NaN for an
     impact that takes more than `MOST_STEPS`.
@@ -82,7 +82,7 @@ def _program(harmonics: int) -> Callable[[Array], Array]:
 
 
 def _differentiable(f: Callable[[Array], Array]) -> Callable[[Array], Array]:
-    """`f` of a vector, with derivatives of any order and both modes out of forward ones: its loop cannot run back."""
+    """`f` of a vector, differentiable to any order in both modes, though its loop has no reverse mode."""
     whole = jax.custom_jvp(f)
 
     @whole.defjvp
@@ -109,7 +109,7 @@ def _integrals(x: Float[Array, "3"], harmonics: int) -> Float[Array, "2 harmonic
 
 
 def _advance(state: _State, share: Array, swing: Array, phase: Array, order: Array) -> _State:
-    """One step in contact, if it converges, and the flight after it."""
+    """One step in contact, kept if it converges, and the motion without contact after the last step."""
     at, highest = state.motion, phase * order[-1]
     leaving = (at.r < 0) & (-at.r * state.step >= at.w)
     step = jnp.where(leaving, at.w, state.step)
@@ -122,7 +122,7 @@ def _advance(state: _State, share: Array, swing: Array, phase: Array, order: Arr
     fine = (defect <= CONVERGED) & (tail <= SMOOTH) & (turn <= 1.25 * PHASE)
     longer = jnp.where(fine, jnp.clip(0.9 * size, 0.3, 2.0), jnp.clip(0.8 * size, 0.1, 0.7))
     longer = jnp.where(jnp.isnan(longer), 0.3, longer)
-    # A step that would have ended the contact and did not converge is tried again in s, and shorter.
+    # A step that would have ended the contact and did not converge is repeated in s with a smaller step size.
     taken = jnp.where(leaving & ~fine, at.w / -jnp.where(leaving, at.r, -1.0), state.step)
 
     force = weight * nodes.w**10
@@ -154,10 +154,10 @@ def _advance(state: _State, share: Array, swing: Array, phase: Array, order: Arr
 def _contact_step(
     at: _Motion, step: Array, leaving: Array, share: Array, swing: Array
 ) -> tuple[_Motion, Array, Array, Array]:
-    """Collocation at Gauss points, in s or, `leaving`, in -w.
+    """Collocation at Gauss points, in s or, if `leaving`, in -w.
 
-    **Returns:** motion at the points; the weights of integrals over time; the last change of the iteration; the last
-    Legendre coefficients.
+    **Returns:** motion at the points; time weights; last change of the iteration; largest of the last Legendre
+    coefficients.
     """
     inner = jnp.asarray(INNER)
 
@@ -184,11 +184,11 @@ def _contact_step(
 
 
 def _flight(at: _Motion, swing: Array) -> tuple[_Motion, Array]:
-    """To the next touch, and whether there is one.
+    """Motion at the next contact, and True if there is one.
 
-    With theta = kappa t and u = v - r the gap times kappa is G = B (cos theta - 1) + u sin theta - v theta. It opens at
-    first, to a maximum, and closes down to a minimum: minima rise from turn to turn if v < 0 and sink if v > 0.
-    Newton's method from the point of inflection between the two runs up to the root without passing it.
+    With theta = kappa t and u = v - r the gap times kappa is G = B (cos theta - 1) + u sin theta - v theta. It first
+    rises to a maximum, then falls to a minimum; successive minima rise if v < 0 and fall if v > 0. Newton's method from
+    the inflection point between maximum and minimum converges to the root without passing it.
     """
     bar, u, v = at.bar, at.v - at.r, at.v
     reach, lag = jnp.sqrt(bar * bar + u * u), jnp.arctan2(u, bar)
@@ -197,7 +197,7 @@ def _flight(at: _Motion, swing: Array) -> tuple[_Motion, Array]:
     turn = 2 * jnp.pi
     stops = reach > jnp.abs(v)
     lean = jnp.arcsin(jnp.where(stops, v / jnp.where(stops, reach, 1.0), 0.0))
-    # G' = 0 where sin(theta - lag) = -v/reach; it sinks from theta - lag = -lean to pi + lean, bends at pi/2.
+    # G' = 0 where sin(theta - lag) = -v/reach; G falls from theta - lag = -lean to pi + lean, with inflection at pi/2.
     top = jnp.mod(lag - lean, turn)
     low = top + jnp.pi + 2 * lean
     deep = gap(low)
@@ -215,7 +215,7 @@ def _flight(at: _Motion, swing: Array) -> tuple[_Motion, Array]:
 
     start = jax.lax.stop_gradient((newton(middle), middle))
     hold = jax.lax.while_loop(unfinished, lambda c: (newton(c[0]), c[0], c[2] + 1), (*start, jnp.asarray(0)))[0]
-    root = newton(newton(jax.lax.stop_gradient(hold)))  # the two carry the derivatives
+    root = newton(newton(jax.lax.stop_gradient(hold)))  # these two iterations carry the derivatives
     c, s = jnp.cos(root), jnp.sin(root)
     there = _Motion(jnp.zeros_like(v), v - (u * c - bar * s), v, bar * c + u * s, at.time + root / swing)
     return jax.tree.map(lambda a, b: jnp.where(again, a, b), there, at), again

@@ -1,6 +1,5 @@
 """Elastic support between cage and rib, paper eqs. (16) and (20): springs, a cubic term, damping, cross-coupling; and
-the rib that guides the cage, rigid or a mass on its own elastic support.
-"""
+the guiding rib, rigid or a mass on its own elastic support."""
 
 from typing import ClassVar, Literal
 
@@ -42,7 +41,7 @@ class Support(AbstractLaw):
     cubic: Cubic = choice("absolute", "dimensionless", text="how the cubic stiffness is given", default="absolute")
 
     def at(self, cage: GuidedCage, speed: Scalar) -> "SupportForce":
-        """The support of `cage`; a cubic term that is dimensionless becomes softer with a larger clearance."""
+        """Support force of `cage`; a dimensionless cubic term softens as the clearance grows."""
         cubic = self.cubic_stiffness
         if self.cubic == "dimensionless":
             cubic = self.cubic_ratio * ((self.stiffness_x + self.stiffness_y) / 2) / cage.clearance**2
@@ -51,11 +50,11 @@ class Support(AbstractLaw):
 
 
 class SupportForce(AbstractForce):
-    """Springs, cross-coupling and damping.
+    """Force of springs, cross-coupling and damping.
 
-    -(K + K_3 |r|^2) r, our isotropic form of the paper's cubic stiffness with K_x and K_y of its fig. 6. Cross-coupling
-    is `circulatory`, K_xy (-y, x), which pumps energy into whirl; or `as_printed` in (20), -K_xy (y, x) - K'_xy (y^3,
-    x^3), whose linear part is conservative.
+    The spring force is -(K + K_3 |r|^2) r, an isotropic form of the paper's cubic stiffness with K_x and K_y of its
+    fig. 6. Cross-coupling is `circulatory`, K_xy (-y, x), which feeds energy into whirl; or `as_printed` in (20), -K_xy
+    (y, x) - K'_xy (y^3, x^3), whose linear part is conservative.
     """
 
     stiffness_x: Scalar
@@ -79,13 +78,13 @@ class SupportForce(AbstractForce):
 
 
 class RigidRib(eqx.Module):
-    """A rib that does not move: the cage has two coordinates."""
+    """Fixed rib: the cage has two coordinates."""
 
     kind: ClassVar[str] = "rigid"
 
 
 class ElasticRib(eqx.Module):
-    """A rib of finite mass on a nonlinear spring and a damper: cage and rib have four coordinates together."""
+    """Rib of finite mass on a nonlinear spring and a damper: cage and rib have four coordinates together."""
 
     kind: ClassVar[str] = "elastic"
 
@@ -106,6 +105,6 @@ class ElasticRib(eqx.Module):
     )
 
     def holding_force(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> tuple[Scalar, Scalar]:
-        """-(K_O + K_O3 |r|^2) r - B_O r' [N]: the force that holds the rib in place."""
+        """Force that holds the rib in place, -(K_O + K_O3 |r|^2) r - B_O r' [N]."""
         hardening = self.stiffness + self.cubic_stiffness * (x * x + y * y)
         return -hardening * x - self.damping * vx, -hardening * y - self.damping * vy

@@ -1,4 +1,4 @@
-"""Tables, figures and the report: numbers and data sets as people read them, with units converted when they are shown.
+"""Tables, figures and the report: results for people to read, with units converted for display.
 
 | module             | responsibility                                                        |
 |--------------------|-----------------------------------------------------------------------|
@@ -10,7 +10,7 @@
 | `orbit_figures`    | branches of periodic orbits, Floquet multipliers                      |
 | `maps`             | bifurcation curves, exponents and labels over speed and a parameter   |
 | `design_figures`   | elasticities, searches for better designs, chances of chaos           |
-| `zone_tables`      | zones found in a sweep or by a search, bifurcations, stable stretches |
+| `zone_tables`      | zones found in a sweep or by a search, bifurcations, stable ranges    |
 | `slope_tables`     | derivatives of edges, of lasting chaos, of means                      |
 | `quantity_tables`  | quantities over speed and of one run, statics                         |
 | `parameter_tables` | parameters with their sources, two designs compared                   |

@@ -1,4 +1,4 @@
-"""Chances of chaos of a design that is known within ranges only, and ranges that measurements narrowed."""
+"""Tables of the chances of chaos of a design with unknown parameters, and of ranges narrowed by measurements."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -12,17 +12,17 @@ from .tables import Beside, Column, Table, chosen, speed_columns, table
 
 
 MOST = 3
-"""Values that are advised to be measured."""
+"""Largest number of values advised for measurement."""
 WORDS = {
     "not decided": "not decided by what is known",
     "calm as computed": "calm where computed",
     "chaotic as computed": "chaotic where computed",
 }
-"""Verdicts in words, where they differ."""
+"""Text of verdicts that are shown in other words."""
 
 
 def chances_document(found: Ensemble) -> dict[str, Any]:
-    """Chances by speed for a document."""
+    """Chances of chaos by speed for a JSON document."""
     names = ("chance_lower", "chance_upper", "chaotic_draws", "finished_draws")
     counts = dict(zip(names, (*found.interval, *found.counts), strict=True))
     failed = {"draws": len(found.place), "failed": int(np.sum(found.failed)), "speeds_rpm": found.rpm}
@@ -30,7 +30,7 @@ def chances_document(found: Ensemble) -> dict[str, Any]:
 
 
 def chances_tables(name: str, found: Ensemble, beside: Beside = None) -> list[Table]:
-    """Stretches of speed with one verdict, and the unknown values, the most telling first."""
+    """Tables of speed ranges with one verdict, and of the unknown values, the most influential first."""
     (low, high), verdicts, lost = found.interval, found.verdict, len(found.place) - found.counts[1]
     span = lambda x, unit="": " to ".join(dict.fromkeys(f"{end:.0f}" for end in (np.min(x), np.max(x)))) + unit
     stretches = []
@@ -54,13 +54,13 @@ def chances_tables(name: str, found: Ensemble, beside: Beside = None) -> list[Ta
 
 
 def range_words(found: Range, unit: str) -> str:
-    """The ends of a range with their unit."""
+    """Text of a range with its unit."""
     low, high = (f"{end:.4g}".replace("e+0", "e").replace("e+", "e") for end in (found.lower, found.upper))
     return f"{low} to {high} {'' if unit == '1' else unit}".rstrip()
 
 
 def chances_answer(found: Ensemble) -> str:
-    """A sentence that says what the known values decide, and what to do about the rest."""
+    """Sentence on what the known values decide, and what to do about the rest."""
     if count := int(np.sum(found.undecided)):
         said = f"Known values do not decide between calm and chaotic at {count} of {found.rpm.size} speeds."
         return f"{said} {measures_words(found.clues())}"
@@ -71,7 +71,7 @@ def chances_answer(found: Ensemble) -> str:
 
 
 def chances_notes(found: Ensemble) -> list[str]:
-    """How the draws were run, what became of those that failed, and how to measure each unknown value."""
+    """Notes on how the draws were run, how many failed, and how to measure each unknown value."""
     length = f"{found.discard} revolutions left out, {found.revolutions} observed"
     notes = [f"One initial state for each draw, {length}: chaos that dies out later counts too."]
     if np.any(found.failed):
@@ -86,7 +86,7 @@ def chances_notes(found: Ensemble) -> list[str]:
 
 
 def measures_words(clues: Sequence[Clue]) -> str:
-    """The values to be measured, the most telling first."""
+    """Sentence on the values to be measured, the most influential first."""
     telling = [c for c in clues if c.share > 0][:MOST]
     if not telling:
         return "No single value decides: measure all, or draw more (--draws)."
@@ -94,7 +94,7 @@ def measures_words(clues: Sequence[Clue]) -> str:
 
 
 def measured_table(found: Narrowed, measured: Sequence[Measurement], beside: Beside = None) -> Table:
-    """The distance of the best draw from each measurement."""
+    """Table of the distance of the best draw from each measurement."""
     rows = [
         {"what": str(m), "measured": m.quantity, "rpm": m.cage_rpm, "value": m.words, "off_by_tolerances": float(off)}
         for m, off in zip(measured, found.nearest, strict=True)
@@ -105,7 +105,7 @@ def measured_table(found: Narrowed, measured: Sequence[Measurement], beside: Bes
 
 
 def narrowed_table(found: Narrowed, units: Mapping[str, str]) -> Table:
-    """Each range before and after, with the unit of each value by its label."""
+    """Table of each range before and after, with units by the label of the value."""
     rows = []
     for u, r, share, worth in zip(found.unknowns, found.ranges, found.share, found.narrowed, strict=True):
         before, after = (range_words(each, units[u.label]) for each in (u.range, r))

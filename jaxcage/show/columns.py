@@ -1,4 +1,4 @@
-"""Time histories, strobe points and branches as CSV: one column per quantity, its SI unit in the head."""
+"""Time histories, strobe points and branches as CSV: one column per quantity, with its SI unit in the header."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -22,7 +22,7 @@ Columns = dict[str, Shaped[np.ndarray, " rows"]]
 
 
 def write_columns(path: str | Path, columns: Mapping[str, Shaped[np.ndarray, " rows"]]) -> Path:
-    """Write columns of one length under their names; nothing is left behind if that fails."""
+    """Write columns of one length under their names to a CSV file, whole or not at all."""
     table = np.column_stack([np.asarray(column) for column in columns.values()])
     with replacing(path) as temporary:
         np.savetxt(temporary, table, fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
@@ -39,7 +39,7 @@ def _of_states(states: Float[np.ndarray, "rows dim"]) -> Columns:
 
 
 def trajectory_columns(trajectory: Trajectory, forces: Mapping[str, Float[np.ndarray, "samples 2"]]) -> Columns:
-    """Time, phase, state and each force of a trajectory, heads such as `y_C [m]` and `film_y [N]`."""
+    """Time, phase, state and each force of a trajectory, with headers such as `y_C [m]` and `film_y [N]`."""
     columns = {"time [s]": trajectory.time, "tau [rad]": trajectory.tau, **_of_states(trajectory.state)}
     for name, force in forces.items():
         columns |= {f"{name}_{axis} [N]": force[:, i] for i, axis in enumerate("xy")}
@@ -47,7 +47,7 @@ def trajectory_columns(trajectory: Trajectory, forces: Mapping[str, Float[np.nda
 
 
 def roller_columns(history: "RollerHistory") -> Columns:
-    """Time history of a bearing: cage, land, and each roller."""
+    """Time history of a bearing: cage, land and each roller."""
     columns = {"time [s]": history.time, "cage angle [rad]": history.angle}
     columns |= {f"cage place {axis} over clearance": history.place[:, i] for i, axis in enumerate("xy")}
     for name in ("pocket_on_cage", "land_on_cage"):
@@ -65,7 +65,7 @@ def strobe_columns(found: xr.Dataset) -> Columns:
 
 
 def branch_columns(branches: Sequence["Branch"]) -> Columns:
-    """All orbits of branches over speed: which branch, speed, state and multipliers."""
+    """All orbits of branches over speed: number of the branch, speed, stability, state and multipliers."""
     columns = {
         "branch": _joined(np.full(b.value.size, i) for i, b in enumerate(branches)),
         "speed [rpm]": _joined(b.speed_rpm for b in branches),
@@ -78,7 +78,7 @@ def branch_columns(branches: Sequence["Branch"]) -> Columns:
 
 
 def curve_columns(curves: Sequence["Curve"], axis: "Axis") -> Columns:
-    """Points of curves over speed and a parameter, in the units in which these are shown."""
+    """Points of curves over speed and a parameter, in display units."""
     columns = {"curve": _joined(np.full(c.x_value.size, i) for i, c in enumerate(curves, start=1))}
     columns["speed [rpm]"] = _joined(c.x_value for c in curves) * 30 / np.pi
     columns[axis.column.title] = axis.shown(_joined(c.y_value for c in curves))

@@ -1,4 +1,4 @@
-"""Designs: elasticities of edges and statistics, the search for a better design, chances of chaos."""
+"""Figures of designs: elasticities of edges and statistics, the search for a better design, chances of chaos."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -25,16 +25,15 @@ if TYPE_CHECKING:
 
 EDGE_COLOURS = (BLUE, VERMILION, style.GREEN, PURPLE, style.ORANGE, style.SKY)
 MOST = 12
-"""Parameters in a figure."""
+"""Largest number of parameters in a figure."""
 SURE = 0.05
 """Chances at most this far from 0 or 1 count as decided."""
 
 
 def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None) -> Axes:
-    """Elasticities of edges, or of widths, by the parameters that move any of them most.
+    """Bar chart of the elasticities of edges, or of widths, by the parameters that move any of them most.
 
-    Guidance gap and eccentricity are on top; the others follow by their largest elasticity. Bars of a sensitivity that
-    is not to be trusted are hatched.
+    Guidance gap and eccentricity are on top; the others follow by their largest elasticity. Untrusted bars are hatched.
 
     **Arguments:** sensitivities, one colour each; axes.
 
@@ -68,7 +67,7 @@ def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None
 
 
 def _named_rows(ax: Axes, names: Sequence[str], size: float | int = 9) -> None:
-    """Names of horizontal bars, the first on top, and a line at zero."""
+    """Label horizontal bars, the first on top, and draw a line at zero."""
     ax.axvline(0, color=BLACK, linewidth=0.8)
     ax.set_yticks(np.arange(len(names)), names, fontsize=size)
     ax.tick_params(axis="y", length=0)
@@ -87,7 +86,7 @@ def _largest_first(sensitivities: Sequence[Sensitivity]) -> list[str]:
 
 
 def statistic_bars(found: "MeanGradient", title: str = "") -> Figure:
-    """A panel for each statistic that is not 0: elasticity by each direction, with bars of two standard errors."""
+    """Bar charts of each nonzero statistic: elasticity by each direction, with bars of two standard errors."""
     shown = [each for each in found.statistics.values() if each.value]
     names = [readable(name).replace("+", ",\n") for name in shown[0].directions] if shown else []
 
@@ -112,8 +111,8 @@ def _bars_with_errors(
 
 
 def optimum_figure(found: "Optimum", rows: Sequence["BeforeAfter"], title: str = "") -> Figure:
-    """The search beside the relative change of every statistic that is not 0, with bars of two standard errors; changes
-    within them are grey."""
+    """Figure of the progress of a search, and of the relative changes of all nonzero statistics with two standard
+    errors, grey if within them."""
     shown = [row for row in rows if row.before]
     names = [readable(head_of(row.name, row.unit)) for row in shown]
 
@@ -130,8 +129,7 @@ def optimum_figure(found: "Optimum", rows: Sequence["BeforeAfter"], title: str =
 
 
 def chance_of_chaos(found: "Ensemble", ax: Axes | None = None) -> Axes:
-    """Chance of chaos at each speed with its 95 % bar, blue where calm, red where chaotic, purple where it is not
-    decided."""
+    """Diagram of the chance of chaos over speed with 95 % bars: blue if calm, red if chaotic, purple if undecided."""
     ax = style.axes_or_new(ax, 9.0, 4.2)
     rpm, chance, (low, high) = found.rpm, found.chance, found.interval
     groups = {
@@ -154,8 +152,8 @@ def chance_of_chaos(found: "Ensemble", ax: Axes | None = None) -> Axes:
 
 
 def calm_figure(found: "Design", operating: tuple[float, float], title: str = "") -> Figure:
-    """The stable range of a cage before and after, with its edges, beside the operating range; and the costs of the
-    designs that were solved for.
+    """Figure of the stable range before and after a search, the operating range, and the costs of the designs solved
+    for.
 
     **Arguments:** the design; ends of the operating range of cage speed [rpm]; title.
     """

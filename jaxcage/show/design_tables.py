@@ -1,4 +1,4 @@
-"""Designs before and after a search, shares of a variance, and tolerances."""
+"""Tables of designs before and after a search, shares of a variance, and tolerances."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -10,13 +10,13 @@ from .tables import OWN, UNIT, Beside, Column, Table, speed_columns, table
 
 
 MOST = 8
-"""Parameters listed in a budget."""
+"""Largest number of parameters in a budget."""
 IDLE = 1.5
-"""A tolerance that may be wider by more than this factor buys nothing."""
+"""A tolerance that may be wider by more than this factor is reported as needlessly tight."""
 
 
 def changed_table(title: str, model: Any, found: Optimum | Design, vary: Mapping[str, tuple[float, float]]) -> Table:
-    """Parameters that were varied, before and after."""
+    """Table of the varied parameters before and after."""
     info, before = parameter_info(model), parameters(model)
     rows = [
         {"parameter": name.replace("_", " "), "unit": info[name].unit, "before": float(before[name])}
@@ -29,9 +29,8 @@ def changed_table(title: str, model: Any, found: Optimum | Design, vary: Mapping
 
 
 def requirement_table(title: str, found: Design, beside: Beside = None) -> Table:
-    """Requirements: the limit, the given design, the new one, the worst bearing within tolerances, and the speed to
-    which the new value belongs. A multiplier is shown as the revolutions in which a disturbance falls to 1/e.
-    """
+    """Table of requirements: limit, values before and after, the worst bearing within tolerances, and the speed of the
+    new value. A multiplier is shown as the revolutions in which a disturbance falls to 1/e."""
     rows: list[dict[str, Any]] = []
     for r in found.requirements:
         after = found.after.get(r.of)
@@ -54,24 +53,24 @@ def _text(r: Requirement, value: float) -> str:
 
 
 def _reached(r: Requirement, each: Value) -> str:
-    """The value as text; a margin without an edge is that of the limit of the search."""
+    """Text of a value; a margin without an edge is that to the limit of the search."""
     return f"above {_text(r, each.value)}" if "margin" in r.of and not math.isfinite(each.rpm) else _text(r, each.value)
 
 
 def stricter(found: Design) -> dict[str, float]:
-    """Cost of a limit that is 10 % stricter, by requirement, for those that bind."""
+    """Cost of a limit that is 10 % stricter, for each binding requirement."""
     limits, by = {r.name: r for r in found.requirements}, {}
     for name, price in found.prices.items():
         r = limits[name]
         step = 0.1 * abs(r.limit)
-        if r.of == "multiplier":  # of the revolutions N to fall to 1/e, exp(-1/N) is the multiplier
+        if r.of == "multiplier":  # exp(-1/N), with N revolutions to fall to 1/e
             step = 0.1 * -r.limit * math.log(r.limit)
         by[name] = price * step
     return by
 
 
 def budget_of_tolerances_table(model: Any, found: Design) -> Table:
-    """How wide each tolerance may be while the others stay."""
+    """Table of the admissible width of each tolerance with the others fixed."""
     info = parameter_info(model)
     rows = [
         {"parameter": each.name.replace("_", " "), "unit": info[each.name].unit, "width": each.width}
@@ -86,7 +85,7 @@ def budget_of_tolerances_table(model: Any, found: Design) -> Table:
 
 
 def before_and_after_table(title: str, rows: Sequence[BeforeAfter]) -> Table:
-    """Statistics before and after with their standard errors, and their relative changes."""
+    """Table of statistics before and after with their standard errors, and of their relative changes."""
     share = lambda row, value: value / abs(row.before) if row.before and math.isfinite(value) else None
     records = [
         vars(row) | {"known": row.known, "share": share(row, row.change), "share_error": share(row, row.change_error)}
@@ -98,7 +97,7 @@ def before_and_after_table(title: str, rows: Sequence[BeforeAfter]) -> Table:
 
 
 def sobol_table(title: str, shares: SobolIndices) -> Table:
-    """Share of the variance that each value has, alone and with the others."""
+    """Table of the share of the variance due to each value, alone and with the others."""
     rows = []
     for name in sorted(shares.total, key=lambda n: -shares.total[n]):
         row: dict[str, Any] = {"value": name}
@@ -112,7 +111,7 @@ def sobol_table(title: str, shares: SobolIndices) -> Table:
 
 
 def budget_table(budget: ToleranceBudget, tolerance: float) -> Table:
-    """Tolerances [%] that move an edge, or a measure, most."""
+    """Table of the tolerances [%] that move an edge, or a measure, most."""
     unit = "" if budget.unit == "1" else budget.unit
     rows = [
         {"parameter": n, "deviation": budget.deviation[n], "error": budget.error[n]}

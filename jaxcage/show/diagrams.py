@@ -1,6 +1,6 @@
-"""Sweeps over speed: orbit diagram, exponents, quantities, one sweep or several; axes of speed and what is marked.
+"""Diagrams of one or several sweeps over speed: orbits, exponents, quantities; speed axes and marks on them.
 
-Every figure reads the data set of a sweep, its units and its coordinates, whatever model was swept.
+All read units and coordinates from the data set of a sweep, whatever model was swept.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,15 +27,15 @@ Span = tuple[float, float]
 """Lowest and highest speed [rpm]."""
 CAGE, SHAFT = "Cage speed $n$ [rpm]", "Shaft speed [rpm]"
 BELOW = 36.0
-"""Distance of the axis of the other speed from that of the speed [points]."""
+"""Distance of the second speed axis below the first [points]."""
 SWEPT = ("cage_slip", "pocket_force_mean_sum_N", "pocket_force_max_N", "friction_power_W", "synchronous_force_x_N")
 """Quantities of a whole bearing in the figure of a sweep."""
 BESIDE_COLOURS = (style.BLUE, style.VERMILION, *style.LINE_COLOURS[1:4])
-"""Colours of designs beside each other."""
+"""Colours of designs in a comparison."""
 
 
 def label_speed(ax: Axes, speed: xr.Dataset | str = "cage speed") -> Axes:
-    """Name the speed axis in revolutions per minute: the speed of a sweep, or the words for a model's."""
+    """Label the speed axis in rpm, by the speed of a sweep or by a model's words for it."""
     text = speed if isinstance(speed, str) else speed["rpm"].attrs.get("long_name", "speed")
     names = {"cage speed": CAGE, "shaft speed": SHAFT}
     ax.set_xlabel(names.get(text, f"{text[:1].upper()}{text[1:]} [rpm]"))
@@ -44,13 +44,13 @@ def label_speed(ax: Axes, speed: xr.Dataset | str = "cage speed") -> Axes:
 
 
 def speed_limits(sweep: xr.Dataset) -> Span:
-    """First and last speed [rpm] of a sweep; 50 rpm around a single one."""
+    """First and last speed [rpm] of a sweep; ±50 rpm around a single one."""
     first, last = float(sweep["rpm"][0]), float(sweep["rpm"][-1])
     return (first, last) if last > first else (first - 50, first + 50)
 
 
 def add_shaft_axes(figure: Figure, speeds: xr.Dataset | float) -> Figure:
-    """Add a second axis beneath every axis of the cage speed, for the speed of the shaft.
+    """Add an axis of the shaft speed below every axis of the cage speed.
 
     **Arguments:** figure; a sweep, whose coordinates include both speeds, or the cage speed over the shaft speed.
 
@@ -77,7 +77,7 @@ def _add_below(ax: Axes, ratio: float) -> None:
 
 
 def shade_zones(ax: Axes, zones: Zones | Sequence[Stretch]) -> Axes:
-    """Shade the chaotic zones, an open one to the end of the axis; or stretches of speed by the motion of the cage."""
+    """Shade chaotic zones, an open one to the end of the axis; or speed ranges by the motion of the cage."""
     low, high = ax.get_xlim()
     if isinstance(zones, Zones):
         shaded = [("chaotic zone", style.ZONE, 1.0, zone_span(zone, low, high)) for zone in zones.zones]
@@ -95,16 +95,14 @@ def shade_zones(ax: Axes, zones: Zones | Sequence[Stretch]) -> Axes:
 
 
 def published_edges(published: PublishedCase) -> dict[str, float]:
-    """The published edges of a case [rpm] by name."""
+    """Published edges of a case [rpm] by name."""
     names = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
     return {name: getattr(published, f"{name.replace(' ', '_')}_rpm") for name in names}
 
 
 def mark_published(ax: Axes, published: PublishedCase, text: bool = True) -> Axes:
-    """Mark the published edges inside the axis with dotted lines, and triangles with their speed above the frame.
-
-    A triangle points into the zone: right at an onset, left at an exit.
-    """
+    """Mark published edges inside the axis with dotted lines, and triangles with their speed above the frame, which
+    point into the zone: right at an onset, left at an exit."""
     low, high = ax.get_xlim()
     inside = {name: rpm for name, rpm in published_edges(published).items() if low <= rpm <= high}
     above = ax.get_xaxis_transform()
@@ -130,13 +128,14 @@ def mark_operating(ax: Axes, spans: Sequence[Span]) -> None:
 
 
 def reported(sweep: xr.Dataset, wanted: Sequence[str]) -> list[str]:
-    """The wanted quantities that the swept model reports; the first six where it reports others only."""
+    """Wanted quantities that the swept model reports; the first six quantities if it reports none of them."""
     every = [str(name).removesuffix("_blocks") for name in sweep.data_vars if str(name).endswith("_blocks")]
     return [name for name in wanted if name in every] or every[:6]
 
 
 def orbit_diagram(sweep: xr.Dataset, component: int = 1, ax: Axes | None = None) -> Axes:
-    """Strobe states over speed from all initial states, coloured by label; failed lanes are crosses at the foot.
+    """Orbit diagram: strobe states over speed from all initial states, coloured by label; failed lanes are crosses at
+    the bottom.
 
     **Arguments:** sweep; component of the state (1: vertical displacement of a cage); axes.
     """
@@ -161,10 +160,7 @@ def orbit_diagram(sweep: xr.Dataset, component: int = 1, ax: Axes | None = None)
 
 def exponent_strip(sweep: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Largest Lyapunov exponent over speed: points for every initial state, a line for the largest of them with ±2
-    standard errors.
-
-    The lower limit is cut where strongly attracting orbits would hide the range around zero.
-    """
+    standard errors. The lower limit is cut where strongly attracting orbits would hide the range around zero."""
     ax = style.axes_or_new(ax, height=2.5)
     rpm = sweep["rpm"].values
     largest, error = sweep["exponents"].values[..., 0], sweep["standard_error"].values[..., 0]
@@ -186,8 +182,7 @@ def exponent_strip(sweep: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 
 def _exponent_limits(values: np.ndarray, top: np.ndarray, band: np.ndarray) -> Span:
-    """Limits that include every exponent and bar above zero, or the line of the largest exponents where all are
-    negative."""
+    """Axis limits that include every exponent above zero, or the largest exponents if all are negative."""
     if not np.any(np.isfinite(values)):
         return -0.05, 0.1
     least, most = float(np.nanmin(values)), float(np.nanmax(values))
@@ -197,7 +192,7 @@ def _exponent_limits(values: np.ndarray, top: np.ndarray, band: np.ndarray) -> S
 
 
 def _lines(ax: Axes, name: str, sweeps: dict[str, xr.Dataset]) -> Axes:
-    """A line over speed for each sweep: means of a variable over the initial states, with standard errors."""
+    """Draw a line over speed for each sweep: means of a variable over the initial states, with standard errors."""
     for (text, sweep), colour in zip(sweeps.items(), cycle(BESIDE_COLOURS), strict=False):
         column = column_of(sweep, name)
         mean, error = (column.scale * x for x in mean_over_starts(sweep, name))
@@ -209,7 +204,7 @@ def _lines(ax: Axes, name: str, sweeps: dict[str, xr.Dataset]) -> Axes:
 
 
 def _over_speed(draw: Sequence[Callable[[Axes], Axes]], title: str = "", first: float = 1.0) -> Figure:
-    """A figure of diagrams over one axis of speed, the first row so many times as high as the others."""
+    """Figure of diagrams over one axis of speed; `first` is the relative height of the first row."""
     columns = 2 if len(draw) > 3 else 1
     rows = -(-len(draw) // columns)
     size, heights = (9.5 if columns == 1 else 11.5, 1.6 + 2.4 * rows), (first, *[1.0] * (rows - 1))
@@ -222,7 +217,7 @@ def sweep_figure(
     published: PublishedCase | None = None,
     title: str = "",
 ) -> Figure:
-    """All that a sweep recorded: strobe states if there are any, quantities that the model reports, exponents.
+    """Figure of a sweep: strobe states if there are any, quantities that the model reports, exponents.
 
     **Arguments:** sweep; zones or stretches, which are shaded; the published case, whose edges are marked; title.
     """
@@ -246,8 +241,7 @@ def quantities_beside(
     differ: Sequence[Span] = (),
     title: str = "",
 ) -> Figure:
-    """Variables of several sweeps, or ramps, over speed with a line for each; stretches of speed [rpm] in which they
-    differ are shaded."""
+    """Figure of variables of several sweeps, or ramps, over speed; ranges [rpm] in which they differ are shaded."""
     lines = dict(zip(names, sweeps, strict=True))
     figure = _over_speed([partial(_lines, name=name, sweeps=lines) for name in quantities], title)
     rpm = sweeps[0]["rpm"].values

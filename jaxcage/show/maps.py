@@ -1,4 +1,4 @@
-"""Maps over speed and a parameter: its range, bifurcations followed over both, exponents, quantities and labels."""
+"""Maps over speed and a parameter: bifurcations followed over both, exponents, quantities and labels."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -28,39 +28,39 @@ from .tables import Column, Table, table
 
 SPEED = "speed"
 BELOW, ABOVE = 0.8, 1.25
-"""Range of a parameter over its value, unless told otherwise."""
+"""Default range of a parameter, over its value."""
 STEEPEST = 0.3
-"""Exponent at which the colours end."""
+"""Largest absolute exponent of the colour scale."""
 MAPPED = ("cage_slip", "friction_power_W")
-"""Quantities of a map, of those that the model reports."""
+"""Quantities in a map, if the model reports them."""
 RPM = 30 / np.pi
 
 
 @dataclasses.dataclass(frozen=True)
 class Axis:
-    """A parameter between two values, the second direction of a map."""
+    """Parameter between two values, the second direction of a map."""
 
     name: str
     lower: float
-    """[SI]."""
+    """Lowest value [SI]."""
     upper: float
     unit: str
     """SI unit."""
     speed_text: str = "cage speed"
-    """Words for the speed, the first direction."""
+    """Name of the speed, the first direction."""
 
     @property
     def column(self) -> Column:
-        """How its values are shown."""
+        """Column that shows its values."""
         return Column(self.name, unit=self.unit)
 
     def shown(self, values: Any) -> np.ndarray:
-        """Values [SI] in the unit in which they are shown."""
+        """Values [SI] in display units."""
         return np.asarray(values * self.column.scale)
 
 
 def parameter_axis(model: Any, name: str, lower: float | None = None, upper: float | None = None) -> Axis:
-    """A parameter between two values [SI], by default a fifth below to a quarter above its own.
+    """Axis of a parameter between two values [SI], by default a fifth below to a quarter above its own.
 
     **Raises:** `ArgumentError` for a range that is not allowed, or does not hold the value itself.
     """
@@ -87,7 +87,7 @@ def follow_edges(
     method: AbstractMethod | None,
     say: Callable[[str, int, int], None],
 ) -> tuple[list[Curve], dict[str, str]]:
-    """A curve through each named edge over speeds [rad/s] and a parameter, and the reason where there is none."""
+    """Curves through named edges over speeds [rad/s] and a parameter, and reasons for those without one."""
     curves, refused = [], {}
     limits: dict[str, Any] = {"lower": axis.lower, "upper": axis.upper, "x_lower": speeds[0], "x_upper": speeds[1]}
     for done, (name, point) in enumerate(edges.items()):
@@ -104,7 +104,7 @@ def follow_edges(
 
 
 def curves_table(title: str, curves: list[Curve], axis: Axis) -> Table:
-    """The ranges that curves cover, and how they end."""
+    """Table of the ranges that curves cover, and how they end."""
     ends = lambda name, values: {f"{name}_low": float(np.min(values)), f"{name}_high": float(np.max(values))}
     rows = [
         {"edge": c.name, "kind": c.kind, "points": int(np.size(c.x_value)), "ends": " / ".join(c.ended)}
@@ -125,9 +125,9 @@ def top_exponent(found: xr.Dataset) -> Float[np.ndarray, "x y"]:
 
 
 def stability_map(axis: Axis, curves: Sequence[Curve], ax: Axes | None = None, found: xr.Dataset | None = None) -> Axes:
-    """Curves of bifurcations over speed and a parameter, coloured by kind.
+    """Bifurcation curves over speed and a parameter, coloured by kind.
 
-    **Arguments:** the parameter; curves; axes; a map of labels, whose largest exponents are drawn beneath with white at
+    **Arguments:** the parameter; curves; axes; a map of labels, whose largest exponents are drawn beneath, white at
     zero.
 
     **Raises:** `ValueError` if a curve is over anything else.
@@ -155,7 +155,7 @@ def stability_map(axis: Axis, curves: Sequence[Curve], ax: Axes | None = None, f
 
 
 def _draw_curve(ax: Axes, curve: Curve, x: np.ndarray, y: np.ndarray) -> None:
-    """Draw the curve, dotted where its points are neutral saddles and no bifurcations."""
+    """Draw a curve, dotted where its points are neutral saddles and no bifurcations."""
     drawn = {line.get_label() for line in ax.get_lines()}
     genuine = np.asarray(curve.genuine[:-1] & curve.genuine[1:])
     look: Any = {"color": mark_of(curve.kind).colour, "path_effects": style.halo(3.6), "zorder": 3}
@@ -166,7 +166,7 @@ def _draw_curve(ax: Axes, curve: Curve, x: np.ndarray, y: np.ndarray) -> None:
 
 
 def _cells(found: xr.Dataset, axis: Axis) -> tuple[np.ndarray, np.ndarray]:
-    """Borders of the cells of a map over speed [rpm] and its parameter, half way between their points."""
+    """Borders of the cells of a map over speed [rpm] and its parameter, halfway between the points."""
     sides = []
     for x in (RPM * found[SPEED].values, axis.shown(found[axis.name].values)):
         middle = (x[1:] + x[:-1]) / 2
@@ -175,7 +175,7 @@ def _cells(found: xr.Dataset, axis: Axis) -> tuple[np.ndarray, np.ndarray]:
 
 
 def map_figure(axis: Axis, curves: Sequence[Curve], found: xr.Dataset | None, title: str = "") -> Figure:
-    """Largest exponents with the curves on top, labels, and what the model reports: means over initial states.
+    """Figure of a map: largest exponents with the curves on top, labels, and means of reported quantities.
 
     **Arguments:** the parameter; curves; a map of labels, or None for the curves alone; title.
     """
@@ -205,7 +205,7 @@ def map_figure(axis: Axis, curves: Sequence[Curve], found: xr.Dataset | None, ti
 
 
 def _colour_labels(ax: Axes, x: np.ndarray, y: np.ndarray, labels: np.ndarray) -> None:
-    """Colours of the labels, grey where initial states differ or lanes failed."""
+    """Draw the labels as colours, grey where initial states differ or lanes failed."""
     kinds = np.where(np.char.startswith(labels, "periodic"), "periodic", labels)
     known = {**style.KIND_COLOURS, **style.MOTION_COLOURS}
     pale: Any = lambda colour: tuple(0.45 + 0.55 * part for part in to_rgb(colour))

@@ -18,13 +18,13 @@ from .zone_tables import zone_span
 
 
 CLOSE = 0.05
-"""An edge nearer than this share of the speed is called close."""
+"""Relative distance within which an edge is called close."""
 _TO = re.compile(r"\s*(?:-|–|\bto\b)\s*")
 
 
 @dataclasses.dataclass(frozen=True)
 class Operating:
-    """A speed, or a range of speeds, at which the model runs [rpm]."""
+    """Operating speed, or range of speeds, of the model [rpm]."""
 
     low_rpm: float
     high_rpm: float
@@ -35,14 +35,14 @@ class Operating:
 
 
 def read_operating(text: str, model: AbstractForcedSystem, unsaid: Whose | None = None) -> tuple[Operating, ...]:
-    """Speeds and ranges such as `8500, 12000-15000`, `900 rad/s, 1200 to 1500 rad/s` or `20000-24000 rpm shaft`.
+    """Read speeds and ranges such as `8500, 12000-15000`, `900 rad/s, 1200 to 1500 rad/s` or `20000-24000 rpm shaft`.
 
-    **Arguments:** the text, in rpm unless it names a unit; the model; whose speeds (`cage` or `shaft`) they are where
-    the text does not say it, by default those of the model.
+    **Arguments:** the text, in rpm unless it names a unit; the model; `cage` or `shaft` for speeds that do not name
+    one, by default that of the model.
 
     **Returns:** speeds of the model.
 
-    **Raises:** `ValueError`, one sentence.
+    **Raises:** `ValueError` for a text that does not name speeds.
     """
     return tuple(_read_one(part.strip(), model, unsaid) for part in text.split(",") if part.strip())
 
@@ -80,11 +80,11 @@ class Verdict:
     distance_rpm: float | None = None
     """Distance from the operating speed to the nearest edge, 0 where a range includes one."""
     percent: float | None = None
-    """The same, in per cent of the nearer end of the operating speed."""
+    """Distance in per cent of the nearer end of the operating speed."""
 
 
 def chaotic_verdict(at: Operating, zones: Zones, sweep: xr.Dataset) -> Verdict:
-    """Place of `at` among the chaotic zones of a sweep. A speed beside lanes that failed is not called clear."""
+    """Place of `at` among the chaotic zones of a sweep; a speed beside failed lanes is not called clear."""
     rpm, reach = sweep["rpm"].values, zones.resolution_rpm
     found = _beyond(at, rpm) or _verdict(at, zones.zones)
     if found.state == "unknown" or found.state.endswith("inside"):
@@ -108,7 +108,7 @@ def unstable_verdict(
 
 
 def motion_verdict(at: Operating, stretches: Sequence[Stretch], sweep: xr.Dataset) -> Verdict:
-    """Motion of the cage at `at`, `chaotic` where the largest exponent is positive beyond doubt."""
+    """Motion of the cage at `at`, `chaotic` if the largest exponent is significantly positive."""
     met = [s for s in stretches if s.low_rpm <= at.high_rpm and at.low_rpm <= s.high_rpm]
     motions = dict.fromkeys(" or ".join(s.labels).replace("_", " ") for s in met)
     state = "chaotic" if any(s.chaotic for s in met) else "clear"
@@ -122,10 +122,9 @@ def assess(
     orbits: SynchronousOrbits | None = None,
     loss: Sequence[Zone] = (),
 ) -> list[tuple[Operating, dict[str, Verdict]]]:
-    """Each operating speed with the verdicts on it by kind of zone.
+    """Verdicts on each operating speed by kind of zone.
 
-    **Arguments:** operating speeds; a sweep and its zones or stretches; synchronous orbits and the zones without a
-    stable one.
+    **Arguments:** operating speeds; a sweep and its zones or stretches; synchronous orbits and their unstable ranges.
     """
     if not isinstance(found, Zones):
         return [(at, {"motion": motion_verdict(at, found, sweep)}) for at in operating]
@@ -158,7 +157,7 @@ def verdict_table(name: str, assessed: Sequence[tuple[Operating, dict[str, Verdi
 
 
 def calmest(zones: Iterable[Zone], first: float, last: float) -> tuple[float, float] | None:
-    """The widest range between two speeds [rpm] outside of all zones; None if there is none."""
+    """Widest range between two speeds [rpm] outside all zones; None if there is none."""
     free, at = [], first
     for low, high in sorted(zone_span(zone, first, last) for zone in zones):
         free.append((at, low))

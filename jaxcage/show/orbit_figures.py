@@ -33,14 +33,14 @@ MARKS = {
 """Marks of bifurcations in every figure."""
 PERIOD_COLOURS = {1: style.BLUE, 2: style.ORANGE, 3: style.PURPLE, 4: style.SKY}
 SHOWN = quantity("y_C")
-"""Component of the state that is drawn, the second one."""
+"""State component that is drawn, the second one."""
 LABEL_SIZE = 7.5
 REACH = 1.6
 """Largest real and imaginary part of the multipliers that are shown."""
 
 
 def mark_of(kind: str) -> Mark:
-    """Mark of a kind of bifurcation; an unknown kind is a purple cross and keeps its name."""
+    """Mark of a kind of bifurcation; an unknown kind gets a purple cross and keeps its name."""
     return MARKS.get(kind, Mark("P", style.PURPLE, kind))
 
 
@@ -50,9 +50,9 @@ def words(kind: str) -> str:
 
 
 def branch_diagram(branches: Sequence[Branch], ax: Axes | None = None) -> Axes:
-    """Vertical displacement of periodic orbits over speed: stable parts thick, unstable parts thin and light, one
-    colour for each number of periods. Bifurcations that bound a stable part are filled markers with their speed above
-    the frame, others are small and hollow.
+    """Diagram of the vertical displacement of periodic orbits over speed: stable parts thick, unstable parts thin and
+    light, one colour for each number of periods. Bifurcations that bound a stable part are filled markers with their
+    speed above the frame, others are small and hollow.
 
     **Raises:** `ValueError` if a branch is not over speed, or there is none.
     """
@@ -76,7 +76,7 @@ def branch_diagram(branches: Sequence[Branch], ax: Axes | None = None) -> Axes:
 
 
 def orbit_diagram_with_branches(sweep: xr.Dataset, branches: Sequence[Branch], ax: Axes | None = None) -> Axes:
-    """Branches of periodic orbits over the orbit diagram, whose points are grey."""
+    """Orbit diagram in grey with branches of periodic orbits on top."""
     ax = orbit_diagram(sweep, 1, style.axes_or_new(ax, 9.0, 5.0))
     clouds = [line for line in ax.get_lines() if line.get_label() in style.KIND_COLOURS]
     for i, line in enumerate(clouds):
@@ -91,8 +91,7 @@ def orbit_diagram_with_branches(sweep: xr.Dataset, branches: Sequence[Branch], a
 
 
 def polyline(branch: Branch) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], Bool[np.ndarray, " n-1"]]:
-    """Speeds [rpm] and shown vertical displacements, special points included, and True for each stable piece between
-    two points."""
+    """Speeds [rpm] and vertical displacements along a branch with its special points, and True for stable pieces."""
     x, y, stable = branch.speed_rpm, branch.state[:, 1] * SHOWN.factor, branch.stable
     pieces = stable[:-1] & stable[1:]
     done = branch.value.size
@@ -106,7 +105,7 @@ def polyline(branch: Branch) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray,
 
 
 def _share(branch: Branch, point: Point) -> float:
-    """Place of a special point between the branch's point before it (0) and the one after it (1)."""
+    """Position of a special point between the branch points before it (0) and after it (1)."""
     scale = np.ptp(branch.state, axis=0) + 1e-300
     before, after = branch.state[point.index] / scale, branch.state[point.index + 1] / scale
     step = after - before
@@ -125,7 +124,7 @@ def _draw_paths(ax: Axes, periods: int, paths: Sequence[tuple[np.ndarray, np.nda
 
 
 def chosen_pieces(x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The chosen pieces of a polyline, with NaN between pieces that are not neighbours."""
+    """Chosen pieces of a polyline, with NaN between pieces that are not neighbours."""
     change = np.diff(np.concatenate([[0], chosen.astype(int), [0]]))
     ends = zip(np.flatnonzero(change == 1), np.flatnonzero(change == -1), strict=True)
     kept = [np.append(np.arange(a, b + 1), -1) for a, b in ends]
@@ -134,7 +133,7 @@ def chosen_pieces(x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> tuple[np.
 
 
 def _mark_points(ax: Axes, points: Sequence[Point], places: Any) -> None:
-    """Mark bifurcations at their `places`: filled where a stable orbit is on one side, else small and hollow."""
+    """Mark bifurcations at their `places`: filled with a stable orbit on one side, else small and hollow."""
     for kind in [*MARKS, *sorted({p.kind for p in points} - set(MARKS))]:
         mark = mark_of(kind)
         for edge in (True, False):
@@ -150,7 +149,7 @@ def _mark_points(ax: Axes, points: Sequence[Point], places: Any) -> None:
 
 
 def _write_above(ax: Axes, points: Iterable[Point]) -> None:
-    """Write kind and speed of points above the frame; those without room beside an earlier one are left out."""
+    """Write kind and speed of points above the frame, except those without room."""
     low, high = ax.get_xlim()
     room = 1.3 * LABEL_SIZE / (ax.get_window_extent().width * 72 / ax.figure.dpi) * (high - low)
     last = -np.inf
@@ -164,9 +163,8 @@ def _write_above(ax: Axes, points: Iterable[Point]) -> None:
 
 
 def multiplier_circle(branch: Branch, ax: Axes | None = None) -> Axes:
-    """Multipliers along a branch, coloured by speed, with the unit circle; critical multipliers of its bifurcations are
-    marked, filled where a stable orbit is on one side. Multipliers beyond 1.6 are not shown.
-    """
+    """Floquet multipliers along a branch, coloured by speed, with the unit circle; critical multipliers of its
+    bifurcations are marked, filled with a stable orbit on one side. Multipliers beyond 1.6 are not shown."""
     ax = style.axes_or_new(ax, 7.0, 5.6)
     ax.add_patch(Circle((0, 0), 1.0, fill=False, color=style.BLACK, linewidth=1.0, zorder=2))
     for line in (ax.axhline, ax.axvline):
@@ -189,6 +187,6 @@ def multiplier_circle(branch: Branch, ax: Axes | None = None) -> Axes:
 
 
 def _critical(point: Point) -> list[tuple[float, float]]:
-    """Places of the critical multipliers in the complex plane, of a Neimark-Sacker bifurcation the pair."""
+    """Critical multiplier in the complex plane, both of a pair for a Neimark-Sacker bifurcation."""
     mu = point.critical
     return [(mu.real, mu.imag), (mu.real, -mu.imag)] if point.kind == "Neimark-Sacker" else [(mu.real, 0.0)]

@@ -1,4 +1,4 @@
-"""Parameters of a model with their units and sources, those in which two designs differ, readings of the paper."""
+"""Tables of parameters with their units and sources, and of differences of two designs; readings of the paper."""
 
 import dataclasses
 import math
@@ -12,7 +12,7 @@ from .tables import OWN, UNIT, Column, Table, table as table_of
 
 
 SHOWN = {"m^2/s": ("mm²/s", 1e6, 0.0), "K": ("°C", 1.0, -273.15), "Pa": ("GPa", 1e-9, 0.0), "1": ("", 1.0, 0.0)}
-"""Unit in which a parameter is shown, the factor from SI, and the offset."""
+"""Display unit of a parameter, factor from SI, and offset."""
 READY_MADE = {("bearing", "designation"): "catalogue, {}", ("lubricant", "grade"): "grade {}"}
 PUBLISHED = {
     ("bearing", "inner_raceway_diameter"): "catalogue",
@@ -24,15 +24,15 @@ PUBLISHED = {
     ("lubricant", "temperature"): "default",
     ("lubricant",): "paper, Table 2, read as a grade",
 }
-"""Sources of a published case by path, of which the longest that fits counts; the paper does not print the rest."""
+"""Sources of a published case by path, of which the longest match counts; the paper does not print the rest."""
 READINGS = {"clearance_reading": "radial clearance", "unbalance": "unbalance"}
 
 
 def sources_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, left: Sequence[str] = ()) -> Table:
-    """All parameters of `model` in the units in which they are read, with their sources.
+    """Table of all parameters of `model` in display units, with their sources.
 
-    **Arguments:** the model; the nested mapping that it was read from, None for a published case; values that are still
-    those of the template, by dotted name.
+    **Arguments:** the model; the nested mapping that it was read from, None for a published case; dotted names of
+    values that are still those of the template.
     """
     rows = []
     for path, field in walk(model):
@@ -54,7 +54,7 @@ def sources_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, 
 
 
 def shown(value: float, unit: str) -> tuple[str, float]:
-    """The unit in which a value [SI] is read, and the value in it."""
+    """Display unit of a value [SI], and the value in it."""
     if unit == "m":
         name, times = ("µm", 1e6) if abs(value) < 1e-4 else ("mm", 1e3)
         return name, value * times
@@ -89,13 +89,12 @@ def _in_file(path: tuple[str, ...], table: Mapping[str, Any]) -> str:
 
 
 def readings_words(model: Any) -> str:
-    """The readings in one line: `radial clearance c = C_r/2 ("radial"), unbalance M e omega^2 ("physical")`."""
+    """Readings in one line: `radial clearance c = C_r/2 ("radial"), unbalance M e omega^2 ("physical")`."""
     return ", ".join(f'{READINGS[name]} {words} ("{chosen}")' for name, (chosen, words) in readings_of(model).items())
 
 
 def differences(models: Sequence[Any]) -> list[dict[str, Any]]:
-    """Dotted name, text, both values [SI], unit and relative change of each parameter or choice in which two designs
-    differ."""
+    """Differences of two designs: dotted name, text, both values [SI], unit and relative change of each."""
     flat = [_flat(configuration(model)) for model in models]
     about = {".".join(path): field.metadata for model in models for path, field in walk(model)}
     found = []
@@ -112,7 +111,7 @@ def differences(models: Sequence[Any]) -> list[dict[str, Any]]:
 
 
 def differences_table(names: Sequence[str], models: Sequence[Any]) -> Table:
-    """Every value in which two designs differ."""
+    """Table of every value in which two designs differ."""
     text = lambda x: x if x is None or isinstance(x, float) else str(x)
     rows = [row | dict(zip(names, map(text, row["values"]), strict=True)) for row in differences(models)]
     columns = [Column("value", "text"), *(Column(name, unit=OWN) for name in names), UNIT]

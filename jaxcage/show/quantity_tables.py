@@ -1,4 +1,4 @@
-"""Quantities over speed, of one run, and of a bearing at rest, as tables."""
+"""Tables of quantities over speed, of one run, and of a bearing at rest."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -15,16 +15,14 @@ from .tables import OWN, UNIT, Column, Table, table
 
 
 LONGEST = 60
-"""Characters of the words for a quantity in a table; longer ones give way to its name."""
+"""Longest description of a quantity in a table [characters]; longer ones are replaced by its name."""
 SHARES = ("cage_slip", "roller_slip_max")
-"""Quantities without a unit that are read in per cent."""
+"""Dimensionless quantities that are shown in per cent."""
 
 
 def mean_over_starts(found: xr.Dataset, name: str) -> tuple[Float[np.ndarray, " rows"], Float[np.ndarray, " rows"]]:
-    """Mean of a variable at each speed over the lanes that did not fail, and its standard error.
-
-    The error comes from the scatter of all blocks; it is NaN for a variable without blocks.
-    """
+    """Mean of a variable at each speed over the lanes that did not fail, and its standard error from the scatter of all
+    blocks, NaN for a variable without blocks."""
     if name == "exponent":
         values, blocks = found["exponents"].values[..., 0], found["block_growth"].values[..., 0]
     else:
@@ -42,12 +40,12 @@ def mean_over_starts(found: xr.Dataset, name: str) -> tuple[Float[np.ndarray, " 
 
 
 def head_of(name: str, unit: str) -> str:
-    """Name of a quantity as the head of a column, without its unit."""
+    """Column header of a quantity: its name without its unit."""
     return name.removesuffix("_" + unit.replace(" ", "_").replace("^", "").replace("/", "_per_")).replace("_", " ")
 
 
 def column_of(found: xr.Dataset, name: str) -> Column:
-    """The column of a variable: its name without the unit, its unit, and its error if it has one."""
+    """Column of a variable, with its unit and its error."""
     if name in ("exponent", "exponents"):
         return Column("largest exponent per revolution", name, error=f"{name}_error")
     unit = found[name].attrs["units"]
@@ -55,7 +53,7 @@ def column_of(found: xr.Dataset, name: str) -> Column:
 
 
 def quantities_table(title: str, found: xr.Dataset, names: Sequence[str]) -> Table:
-    """Means over the lanes that did not fail at each speed, with their standard errors."""
+    """Table of means over the lanes that did not fail at each speed, with their standard errors."""
     columns, values = [Column("speed [rpm]", "speed_rpm", digits=0)], {"speed_rpm": found["rpm"].values}
     for name in names:
         columns.append(column_of(found, name))
@@ -65,7 +63,7 @@ def quantities_table(title: str, found: xr.Dataset, names: Sequence[str]) -> Tab
 
 
 def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Table]:
-    """Quantities of one run with their standard errors; lines of spectra beside the bearing's frequencies."""
+    """Tables of quantities of one run with standard errors, and of spectral lines with the bearing's frequencies."""
     words = lambda q: q.text if len(q.text) <= LONGEST else head_of(q.name, q.unit)
     tables = [_values_table(title, ((words(q), value, q.unit, error) for q, value, error in found.values()))]
     columns = [Column("order of the cage's speed", "order", digits=3), "amplitude"]
@@ -78,7 +76,7 @@ def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Tab
 
 
 def _values_table(title: str, rows: Iterable[tuple[str, Any, str, float | None]]) -> Table:
-    """A table of quantities: words, value [SI], SI unit, standard error."""
+    """Table of quantities from words, value [SI], SI unit and standard error."""
     records = [{"quantity": words, "value": x, "unit": unit, "error": error} for words, x, unit, error in rows]
     return table(title, records, ["quantity", Column("value", unit=OWN, error="error"), UNIT])
 
@@ -90,7 +88,7 @@ def displacements(model: Any, shared: LoadDistribution) -> dict[str, float]:
 
 
 def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed: float | None = None) -> Table:
-    """Loads and displacements at rest, and the kinematics at a shaft speed [rad/s] if one is given."""
+    """Table of loads and displacements at rest, and the kinematics at a shaft speed [rad/s] if one is given."""
     bearing = model.bearing
     rows: list[tuple[str, Any, str]] = [
         ("largest roller load", shared.max_load, "N"),

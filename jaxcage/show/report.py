@@ -1,4 +1,4 @@
-"""The report as one page of HTML that needs nothing from outside: answers of commands, one section for each."""
+"""HTML report in one self-contained page, with a section for each answer of a command."""
 
 import base64
 import dataclasses
@@ -23,7 +23,7 @@ from .tables import Table, table
 
 
 RASTER_DPI = 150
-"""Resolution of clouds of points, which would weigh megabytes as points."""
+"""Resolution of scatter plots, which would take megabytes as vectors."""
 PAPER = (
     "Equations: L. Chen, X. Xia, H. Zheng, M. Qiu, Chaotic Dynamics of Cage Behavior in a High-Speed Cylindrical "
     "Roller Bearing, Shock and Vibration 2016, article 9120505, with its misprints corrected."
@@ -32,7 +32,7 @@ PAPER = (
 
 @dataclasses.dataclass(frozen=True)
 class Section:
-    """A part of the page."""
+    """Section of the report."""
 
     title: str
     sentences: Sequence[str] = ()
@@ -43,7 +43,7 @@ class Section:
 
     @property
     def key(self) -> str:
-        """Address of the section within the page."""
+        """Anchor of the section within the page."""
         return self.title.lower().replace(" ", "-")
 
 
@@ -56,10 +56,10 @@ def page(
     operating: Sequence[Operating] = (),
     command: str = "",
 ) -> str:
-    """The report as HTML.
+    """Render the report as HTML.
 
     **Arguments:** title and subtitle; sections, whose figures get axes of the shaft speed and marks of the operating
-    speeds; the sweep that has both speeds; operating speeds; the command line that asked for the page.
+    speeds; the sweep that has both speeds; operating speeds; the command line that created the page.
     """
     spans = [(at.low_rpm, at.high_rpm) for at in operating]
     environment = jinja2.Environment(
@@ -81,7 +81,7 @@ def page(
 
 
 def _picture(figure: Figure) -> tuple[str, int, int]:
-    """A figure as an address that holds the drawing itself, its width and its height [px at 96 per inch]."""
+    """SVG of a figure as a data URI, its width and its height [px at 96 per inch]."""
     for cloud in figure.findobj(Collection):
         cloud.set_rasterized(True)
     width, height = (round(96 * float(x)) for x in figure.get_size_inches())
@@ -92,7 +92,7 @@ def _picture(figure: Figure) -> tuple[str, int, int]:
 
 
 def settings_table(sweep: xr.Dataset, seconds: float) -> Table:
-    """Versions, machine and settings that a report was made with."""
+    """Table of versions, machine and settings of a report."""
     settings = json.loads(sweep.attrs["settings"])
     versions = [f"{k.removeprefix('version_')} {v}" for k, v in settings.items() if k.startswith("version_")]
     rows = {

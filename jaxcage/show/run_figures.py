@@ -1,4 +1,4 @@
-"""One run: displacements, forces and path of the cage, its strobe section; rollers, slips, spectra; roller loads."""
+"""Figures of one run: displacements, forces, path and strobe section of the cage; rollers, slips, spectra, loads."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ MM = 1e3
 LONGEST_ARROW = 0.14
 """Length of the arrow of the largest pocket force of a run, relative to the outside diameter."""
 SPECTRA = {"cage_place": "Cage, vertical / clearance", "pocket_force": "Pockets, vertical [N]"}
-"""Words for the quantities that have a spectrum."""
+"""Axis labels of the quantities that have a spectrum."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,12 +35,12 @@ class Rollers:
     history: RollerHistory
     around: Around
     spectra: Mapping[str, OrderSpectrum]
-    """Empty for a run of one revolution."""
+    """Empty for a run of less than two revolutions."""
     orders: Mapping[str, float]
 
 
 def rollers_of(model: Any, run: Trajectory) -> Rollers | None:
-    """The rollers of a run; None for a model without rollers."""
+    """Rollers of a run; None for a model without rollers."""
     if model.samples == 1:
         return None
     history = model.roller_history(run)
@@ -56,7 +56,7 @@ def time_history(trajectory: Trajectory, ax: Axes | None = None) -> Axes:
 
 
 def force_history(trajectory: Trajectory, forces: Forces, axis: int = 1, ax: Axes | None = None) -> Axes:
-    """Each force on the cage over time, its horizontal (`axis` 0) or vertical (1) component."""
+    """Each force on the cage over time, horizontal (`axis` 0) or vertical (1)."""
     own = cycle(style.OWN_COLOURS)
     lines: dict[str, tuple[np.ndarray, str, str]] = {}
     for name, force in forces.items():
@@ -79,10 +79,8 @@ def _over_time(
 
 
 def orbit(trajectory: Trajectory, clearance: float, ax: Axes | None = None) -> Axes:
-    """Path of the cage centre relative to the rib in the clearance circle, with a dot at each revolution.
-
-    **Arguments:** trajectory; radial clearance [m]; axes.
-    """
+    """Path of the cage centre relative to the rib, in the circle of the radial clearance [m], with a dot per
+    revolution."""
     ax = style.axes_or_new(ax, 5.0, 5.0)
     path = trajectory.state[:, :2]
     if trajectory.state.shape[1] == 8:  # an elastic rib
@@ -102,7 +100,7 @@ def _path_in_circle(ax: Axes, path: Float[np.ndarray, "n 2"], radius: float, sam
 
 
 def run_figure(model: Any, run: Trajectory, rollers: Rollers | None, title: str = "") -> Figure:
-    """One run of a cage, its path, time history and each force; or of a bearing with its rollers."""
+    """Figure of one run: path, time history and each force of a cage, or a bearing with its rollers."""
     if rollers is not None:
         return _bearing_figure(model, run, rollers, title)
     forces, figure = cage_forces(model, run), style.new_figure(11.5, 6.4)
@@ -140,14 +138,14 @@ def strobe_section(
 
 
 def _wide_limits(values: np.ndarray) -> tuple[float, float]:
-    """Limits so wide that the rounding of a periodic orbit is not enlarged to a cloud."""
+    """Limits wide enough that rounding errors of a periodic orbit do not look like a cloud."""
     low, high = style.padded_limits(values)
     centre, least = (low + high) / 2, 0.02 * max(abs(low), abs(high))
     return min(low, centre - least), max(high, centre + least)
 
 
 def _bearing_figure(model: Any, run: Trajectory, found: Rollers, title: str) -> Figure:
-    """The bearing at its largest pocket force, the path of the cage, slips and forces around it, spectra if any."""
+    """Bearing at its largest pocket force, path of the cage, slips and forces around it, spectra if any."""
     history, rows = found.history, 4 if found.spectra else 3
     figure = style.new_figure(12.0, 11.0 if found.spectra else 8.0)
     grid = figure.add_gridspec(rows, 2, height_ratios=(2.4, 1, 1, 1)[:rows])
@@ -173,9 +171,8 @@ def _bearing_figure(model: Any, run: Trajectory, found: Rollers, title: str) -> 
 
 
 def _drawing(ax: Axes, model: Any, run: Trajectory, history: RollerHistory) -> None:
-    """Rings, rollers and cage at the sample of the largest pocket force, to scale; arrows are the forces of the rollers
-    on the bars of the cage. The displacement of the cage and its clearances, tenths of a millimetre, are not enlarged.
-    """
+    """Draw rings, rollers and cage at the largest pocket force, to scale; arrows are the forces of the rollers on the
+    bars. Displacement and clearances of the cage, tenths of a millimetre, are not magnified."""
     ax.grid(False)
     ax.spines[:].set_visible(False)
     sample = int(np.abs(history.pocket_force).max(axis=1).argmax())
@@ -207,7 +204,7 @@ def _drawing(ax: Axes, model: Any, run: Trajectory, history: RollerHistory) -> N
 
 
 def _bars(model: Any, run: Trajectory, sample: int) -> list[np.ndarray]:
-    """Corners of the bars between the pockets [mm], in the height that guiding surface and roller centres leave."""
+    """Corners of the bars [mm], drawn from the guiding surface towards the roller centres."""
     n, free = model.bearing.n_rollers, float(model.bearing.roller_diameter + model.bearing.pocket_clearance) / 2
     pitch, land = float(model.outer_radius - model.bearing.roller_diameter / 2), float(model.land_radius)
     inner, outer = sorted((land, pitch - 0.6 * (land - pitch)))
@@ -225,7 +222,6 @@ def _bars(model: Any, run: Trajectory, sample: int) -> list[np.ndarray]:
 
 
 def _slip_around(ax: Axes, found: Around) -> None:
-    """Mean slip of the rollers, and their sliding speed on the inner ring, over the circumference."""
     other = ax.twinx()
     other.spines[["top", "left"]].set_visible(False)
     _circumference(ax, "Slip of the rollers [%]")
@@ -238,7 +234,7 @@ def _slip_around(ax: Axes, found: Around) -> None:
 
 
 def _pocket_force_around(ax: Axes, found: Around) -> None:
-    """Mean pocket force over the circumference, of rollers that drive the cage and of rollers that brake it."""
+    """Mean pocket force over the circumference, of rollers that drive and of rollers that brake the cage."""
     degrees, width = np.degrees(found.angle), 0.9 * 360 / len(found.angle)
     ax.bar(degrees, found.driving_force, width, color=style.GREEN, label="rollers drive the cage")
     ax.bar(degrees, -found.braking_force, width, color=style.VERMILION, label="rollers brake the cage")
@@ -265,7 +261,8 @@ def _spectrum(ax: Axes, spectrum: OrderSpectrum, orders: Mapping[str, float], yl
 
 
 def load_bars(distribution: LoadDistribution, ax: Axes | None = None) -> Axes:
-    """Load on the inner raceway of every roller over its angle from the load; dashed lines bound the loaded zone."""
+    """Bar chart of the inner-raceway load of every roller over its angle from the load; dashed lines bound the loaded
+    zone."""
     ax = style.axes_or_new(ax, 7.0, 3.6)
     angles = (np.degrees(np.asarray(distribution.roller_angles)) + 270) % 360 - 180
     half = float(np.degrees(np.asarray(distribution.half_angle)))

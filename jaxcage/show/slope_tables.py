@@ -1,4 +1,4 @@
-"""Derivatives by the parameters of a design: of exact edges, of edges of lasting chaos, of means of a run."""
+"""Tables of derivatives by design parameters: of exact edges, of edges of lasting chaos, of means of a run."""
 
 import dataclasses
 import math
@@ -14,19 +14,19 @@ from .tables import Beside, Column, Table, chosen, number, speed_columns, table
 
 
 FIRST = ("guidance_gap", "eccentricity")
-"""Parameters that are always on top."""
+"""Parameters that are always listed first."""
 FIXED_RHO = "gap at fixed rho"
-"""Change of the gap with which the eccentricity grows, so that rho = e/C_r stays.
+"""Change of the gap and the eccentricity together, at constant rho = e/C_r.
 
-With the printed unbalance, 2 M rho omega^2, that leaves the excitation alone: what remains of the gap's effect is that
-of clearance, film and land. With the physical one it does not.
+With the printed unbalance, 2 M rho omega^2, this keeps the excitation constant and leaves the effect of the gap on
+clearance, film and land. With the physical one it does not.
 """
 TURNED = ("drawing", "catalogue", "oil", "operating")
-"""Kinds of parameters that a designer or a user chooses."""
+"""Kinds of parameters that a designer or a user can choose."""
 
 
 def to_be_turned(model: AbstractForcedSystem, slopes: Iterable[Sensitivity]) -> list[Sensitivity]:
-    """Sensitivities with the parameters that a designer can choose; laws of one's own stay."""
+    """Sensitivities restricted to parameters that a designer can choose and those of user-defined laws."""
     info = parameter_info(model)
     stays = lambda name: info[name].kind in TURNED or name.startswith(EXTRA)
     return [
@@ -46,7 +46,7 @@ def edge_slopes(
 
 
 def elasticities_table(name: str, slopes: Mapping[str, Sensitivity], beside: Beside = None) -> Table:
-    """Relative change of each edge by that of the parameters that are always on top."""
+    """Table of the elasticities of each edge by the parameters that are always listed first."""
     names = "kind error_rpm steps trusted status transversality derivative elasticity homogeneity"
     rows = [
         {"name": edge, "speed_rpm": slope.value_rpm, **chosen(slope, names)}
@@ -60,9 +60,9 @@ def elasticities_table(name: str, slopes: Mapping[str, Sensitivity], beside: Bes
 
 
 def gradient_table(name: str, model: AbstractForcedSystem, slope: Sensitivity) -> Table:
-    """Derivatives of one edge or width: gap and eccentricity on top, then the largest elasticities first.
+    """Table of the derivatives of one edge or width: gap and eccentricity on top, then the largest elasticities first.
 
-    All is about the speed of the cage; that of the shaft also moves with all that enters their ratio.
+    All values refer to the cage speed; the shaft speed also depends on the parameters in their ratio.
     """
     change, info, value = slope.elasticity, parameter_info(model), parameters(model)
     moving = [n for n in slope.derivative if slope.derivative[n] != 0.0 or n in FIRST]
@@ -81,13 +81,13 @@ def gradient_table(name: str, model: AbstractForcedSystem, slope: Sensitivity) -
 
 
 def residual_words(edges: Mapping[str, Sensitivity]) -> str:
-    """The largest residual of the gradients that are to be trusted against the scaling of units."""
+    """Largest residual of the trusted gradients in a test by scaling of units, as text."""
     residuals = [abs(r) for e in edges.values() if e.trusted for r in e.homogeneity.values()]
     return f"{max(residuals):.0e}" if residuals else "none is to be trusted"
 
 
 def source_notes(explained: Explained) -> list[str]:
-    """Sentences about the edges of chaotic zones that coincide with something exact."""
+    """Notes on the edges of chaotic zones that coincide with a bifurcation or the limit of a cascade."""
     edges = [e for zone in explained.zones.zones for e in (zone.onset, zone.exit) if e is not None]
     statistical = sum(e.basis == "statistical" for e in edges)
     notes = [f"Chaotic edges that stay statistical: {statistical} of {len(edges)}"]
@@ -101,7 +101,7 @@ def source_notes(explained: Explained) -> list[str]:
 
 
 def _asked(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
-    """Parameters alone, and gap and eccentricity together."""
+    """Parameters by name, each alone, and gap and eccentricity together."""
     asked: dict[str, tuple[str, ...]] = {n: (n,) for n in names}
     return asked | ({FIXED_RHO: FIRST} if set(FIRST) <= set(asked) else {})
 
@@ -115,7 +115,7 @@ def _with_errors(found: Mapping[str, tuple[float, float]], factor: float = 1.0) 
 
 
 def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int, beside: Beside = None) -> Table:
-    """Edges of lasting chaos, and their elasticities."""
+    """Table of edges of lasting chaos, and their elasticities."""
     names = next(iter(edges.values())).directions
     rows = [
         {"name": each, "speed_rpm": edge.value, "standard_error_rpm": edge.value_error}
@@ -131,7 +131,7 @@ def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int, bes
 
 
 def width_table(title: str, edges: Mapping[str, SolvedEdge], names: Sequence[str]) -> Table:
-    """Widths of all zones of which an edge is known, and what 1 % more of a parameter adds."""
+    """Table of the widths of all zones with a known edge, and of the effect of 1 % more of each parameter."""
     rows = []
     for zone in dict.fromkeys(name.rpartition(" ")[0] for name in edges):
         width: ZoneWidth = zone_width(edges, int(zone.rpartition(" ")[2]))
@@ -147,7 +147,7 @@ def width_table(title: str, edges: Mapping[str, SolvedEdge], names: Sequence[str
 
 
 def mean_gradient_tables(title: str, found: MeanGradient) -> list[Table]:
-    """Elasticities of means with their errors, the largest first, and the means."""
+    """Tables of the elasticities of means with their errors, the largest first, and of the means."""
     rows, moved = [], []
     for name, each in found.statistics.items():
         by: dict[str, dict[str, Any]] = {

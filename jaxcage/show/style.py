@@ -1,4 +1,4 @@
-"""Style of the figures: colours that colour-blind readers can tell apart, thin frames, light grids, no global state.
+"""Style of the figures: colours that colour-blind readers can distinguish, thin frames, light grids, no global state.
 
 The colours are those of Okabe and Ito (https://jfly.uni-koeln.de/color), made for red-green blindness.
 """
@@ -31,7 +31,7 @@ KIND_COLOURS = {
 }
 """Colour of a strobe point by the label of its lane."""
 MOTION_COLOURS = {"circular": GREEN, "locally_periodic": BLUE, "disordered": VERMILION}
-"""Colour of a stretch of speeds by the motion of the cage's centre; other stretches are grey."""
+"""Colour of a speed range by the motion of the cage's centre; others are grey."""
 
 FORCE_COLOURS = {
     "film": BLUE,
@@ -42,29 +42,29 @@ FORCE_COLOURS = {
     "weight": BLACK,
 }
 OWN_COLOURS = (SKY, GREY)
-"""A user's own forces take these in turn, with a dashed line."""
+"""Colours of a user's own forces, in turn, with dashed lines."""
 LINE_COLOURS = (BLUE, SKY, GREEN, PURPLE, VERMILION, ORANGE)
 """Colours of lines beside each other, such as those of initial states."""
 
 
 def halo(width: float) -> list[withStroke]:
-    """A rim in the colour of the paper around a line, so that it can be seen on any background."""
+    """Outline of a line in the colour of the paper, so that it can be seen on any background."""
     return [withStroke(linewidth=width, foreground=PAPER)]
 
 
 def lighter(colour: str) -> tuple[float, float, float]:
-    """The colour half way between `colour` and the paper."""
+    """Colour halfway between `colour` and the paper."""
     r, g, b = ((a + b) / 2 for a, b in zip(to_rgb(colour), to_rgb(PAPER), strict=True))
     return r, g, b
 
 
 def new_figure(width: float = 8.0, height: float = 5.0) -> Figure:
-    """A figure that belongs to no window and no global list, and is freed with its last use."""
+    """New figure that is in no window and no global list, and is freed with its last use."""
     return Figure(figsize=(width, height), layout="constrained", dpi=RASTER_DPI)
 
 
 def drawn(draw: Callable[[Axes], Any], width: float = 9.0, height: float = 5.0, title: str = "") -> Figure:
-    """A figure of one diagram, which `draw` draws on its axes."""
+    """Figure of one diagram, which `draw` draws on its axes."""
     figure = new_figure(width, height)
     draw(figure.subplots())
     figure.suptitle(title, fontsize=11)
@@ -74,7 +74,7 @@ def drawn(draw: Callable[[Axes], Any], width: float = 9.0, height: float = 5.0, 
 def panels(
     draw: Sequence[Callable[[Axes], Any]], columns: int, size: tuple[float, float], title: str = "", **grid: Any
 ) -> Figure:
-    """A figure with a panel for each of `draw`, row by row; only the lowest panels name an axis that they share."""
+    """Figure with a panel for each of `draw`, row by row; only the lowest panels label an axis that they share."""
     figure, rows = new_figure(*size), max(1, -(-len(draw) // columns))
     cells = figure.subplots(rows, columns, squeeze=False, **grid).ravel()
     for i, (panel, ax) in enumerate(zip(draw, cells, strict=False)):
@@ -88,7 +88,7 @@ def panels(
 
 
 def axes_or_new(ax: Axes | None, width: float = 7.0, height: float = 4.5) -> Axes:
-    """`ax` or the only axes of a new figure, in this style."""
+    """Return `ax` or the only axes of a new figure, in this style."""
     return dress(new_figure(width, height).subplots() if ax is None else ax)
 
 
@@ -108,25 +108,24 @@ def dots(colour: str, size: float | int) -> dict[str, Any]:
 
 
 def enlarge_dots(legend: Legend) -> None:
-    """Draw small light points large and full in the legend, so that their colours can be told apart."""
+    """Enlarge small light points in the legend, so that their colours can be distinguished."""
     for handle in legend.get_lines():
         if handle.get_marker() == ".":
             handle.set(markersize=7, alpha=1.0)
 
 
 def legend_above(ax: Axes, ncols: int = 4, size: float | int = 9) -> None:
-    """A legend above the frame, where it hides nothing."""
+    """Add a legend above the frame, where it hides nothing."""
     enlarge_dots(ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=ncols, frameon=False, fontsize=size))
 
 
 def legend_beside(ax: Axes, size: float | int = 9) -> None:
-    """A legend to the right of the frame."""
     place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
     enlarge_dots(ax.legend(**place, frameon=False, fontsize=size, handlelength=1.4))
 
 
 def legend_below(figure: Figure, ncols: int = 5) -> None:
-    """One legend for all axes, beneath them."""
+    """Add one legend for all axes below them."""
     entries = {}
     for ax in figure.axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
@@ -136,13 +135,11 @@ def legend_below(figure: Figure, ncols: int = 5) -> None:
 
 
 def entitled(figure: Figure, title: str) -> Figure:
-    """The figure with a title at its upper left."""
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     return figure
 
 
 def readable(name: str) -> str:
-    """A parameter's name as words."""
     return name.replace(".", " ").replace("_", " ")
 
 

@@ -1,7 +1,6 @@
-"""Tables: records and columns with units, turned into text only when they are shown.
+"""Tables of records and columns with units, for the terminal, the report page and JSON documents.
 
-A table is shown on a terminal or in a report page, and its records stand in a JSON document. Units are converted by
-pint when a table is shown, and numbers carry the digits of their error.
+Units are converted by pint when a table is shown, and numbers carry the digits of their error.
 """
 
 import dataclasses
@@ -14,18 +13,17 @@ import numpy as np
 
 
 SHOWN = {"m": "mm", "rad/s": "rpm", "rad": "deg", "1": ""}
-"""Units in which quantities of an SI unit are shown, unless a column says otherwise."""
+"""Display units by SI unit, unless a column has its own."""
 Beside = tuple[str, float] | None
 """Speed that is shown in place of the model's: `shaft` or `cage`, and its ratio to the model's."""
 NOTHING = "-"
-"""Cell of a value that is not known."""
+"""Cell of an unknown value."""
 OWN = "each its own"
-"""Unit of a column whose records have different units, each under `unit`."""
+"""Unit of a column whose records have different units, each under the key `unit`."""
 
 
 @functools.cache
 def factor(unit: str, shown: str) -> float:
-    """Factor from one unit to another."""
     if unit == shown or {unit, shown} <= {"1", ""}:
         return 1.0
     if (unit, shown) == ("1", "%"):
@@ -51,21 +49,20 @@ def number(value: float, error: float | None = None, digits: int | None = None) 
 
 @dataclasses.dataclass(frozen=True)
 class Column:
-    """How the values under one key of the records are shown: numbers, texts, or None for what is not known."""
+    """Column of a table; its values are numbers, texts, or None if unknown."""
 
     head: str
     key: str = ""
-    """The head if it is left out."""
+    """Key of the values in the records; by default the head."""
     unit: str = "1"
     """SI unit of numbers, or `OWN`."""
     shown: str | None = None
-    """Unit in which numbers are shown; None takes that of `SHOWN`."""
+    """Display unit of numbers; None takes that of `SHOWN`."""
     error: str = ""
     """Key of the standard errors, or uncertainties, in the same unit."""
     digits: int | None = None
-    """Digits after the point; None takes those of the error, or four significant ones."""
+    """Decimal places; None takes those of the error, or four significant digits."""
     nothing: str = NOTHING
-    """Cell of a value that is not known."""
     times: float = 1.0
     """Factor by which numbers are multiplied."""
 
@@ -76,26 +73,26 @@ class Column:
 
     @property
     def title(self) -> str:
-        """Head with the unit."""
+        """Head with the display unit."""
         shown = "" if self.unit == OWN else SHOWN.get(self.unit, self.unit) if self.shown is None else self.shown
         return f"{self.head} [{shown}]" if shown else self.head
 
     @property
     def label(self) -> str:
-        """The same as words on the axis of a figure."""
+        """Axis label of a figure: the title in words."""
         words = self.title.replace("_", " ")
         return words[:1].upper() + words[1:]
 
     @property
     def scale(self) -> float:
-        """Factor from the values to the numbers that are shown."""
+        """Factor from values to displayed numbers."""
         return self._scale(self.unit)
 
     def _scale(self, unit: str) -> float:
         return self.times * factor(unit, SHOWN.get(unit, unit) if self.shown is None else self.shown)
 
     def cell(self, record: Mapping[str, Any]) -> str:
-        """The value of a record as text."""
+        """Text of the value of a record."""
         value = record.get(self.name)
         if value is None or isinstance(value, str):
             return (SHOWN.get(value, value) if value and self.name == "unit" else value) or self.nothing
@@ -111,7 +108,7 @@ class Column:
 
 
 UNIT = Column("unit", nothing="")
-"""The unit in which the numbers of a record are shown in columns of unit `OWN`."""
+"""Column of the display unit of each record, for columns of unit `OWN`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -122,7 +119,7 @@ class Table:
     columns: Sequence[Column]
     records: Sequence[Mapping[str, Any]]
     key: str = ""
-    """Name under which the records stand in a document; without one they do not."""
+    """Name of the records in a document; empty to leave them out."""
     empty: str = "none"
     """Text of the only row where there are no records."""
     detail: bool = False
@@ -158,7 +155,7 @@ def table(
     key: str = "",
     empty: str = "none",
 ) -> Table:
-    """A table of records, which stand in a document under `key`; a column that is a text is the key of its values."""
+    """Table of records, which are in a document under `key`; a column given as text is the key of its values."""
     columns = [Column(column) if isinstance(column, str) else column for column in columns]
     return Table(title, columns, list(records), key, empty)
 
@@ -172,7 +169,7 @@ def speed_columns(
 
 
 def shares_table(title: str, sort: str, counts: Mapping[str, int]) -> Table:
-    """Numbers of each sort, and their shares of all."""
+    """Table of counts by category, and their shares of all."""
     total = sum(counts.values())
     rows = [{sort: what, "number": n, "share": n / total} for what, n in counts.items()]
     return table(title, rows, [sort, "number", Column("share", shown="%", digits=1)])
@@ -184,5 +181,5 @@ def counted(number: int, what: str) -> str:
 
 
 def chosen(found: object, names: str) -> dict[str, Any]:
-    """Some attributes of a result by name."""
+    """Named attributes of a result."""
     return {name: getattr(found, name) for name in names.split()}

@@ -1,4 +1,4 @@
-"""The verdict for an operating range: its sentence, what would decide it, and what to change first."""
+"""Verdict on an operating range: its sentence, what would decide it, and what to change first."""
 
 import math
 from collections.abc import Sequence
@@ -14,13 +14,13 @@ from .tables import OWN, UNIT, Beside, Column, Table, speed_columns, table
 
 
 MOST = 6
-"""Parameters, and unknown values, that are listed."""
+"""Largest number of parameters, or unknown values, listed."""
 FAR = 0.3
-"""Relative change of a parameter beyond which nothing is told from a first derivative."""
+"""Relative change of a parameter beyond which a first derivative is not extrapolated."""
 
 
 def range_sentence(over: str, chance: RangeChance | None, checked: Checked | None) -> str:
-    """The verdict in a sentence: from draws of what is unknown, or from simulations of a design that is known."""
+    """Sentence of the verdict, from draws of the unknowns or from simulations of a known design."""
     if chance is not None:
         low, high = chance.interval
         share = f"{chance.share:.0%}" if chance.known else "unknown"
@@ -40,7 +40,7 @@ def range_sentence(over: str, chance: RangeChance | None, checked: Checked | Non
 
 
 def margin_sentence(found: Margins | str) -> str:
-    """The margin of the best guess, and the change that adds most to it."""
+    """Sentence on the margin of the best guess, and on the change that adds most to it."""
     if isinstance(found, str):
         return f"No margin: {found}"
     end, least = found.least
@@ -58,7 +58,7 @@ def margin_sentence(found: Margins | str) -> str:
 
 
 def margins_table(found: Margins, beside: Beside = None) -> Table:
-    """Edges of the stable range beside the operating range."""
+    """Table of the edges of the stable range beside the operating range."""
     rows: list[dict[str, Any]] = []
     for end in ("lower", "upper"):
         margin = getattr(found, end)
@@ -70,7 +70,7 @@ def margins_table(found: Margins, beside: Beside = None) -> Table:
 
 
 def changes_table(model: Any, found: Margins) -> Table:
-    """Effects of 10 % of each parameter on both margins, and the values at which the range would lose its margin."""
+    """Table of the effects of 10 % of each parameter on both margins, and of the values at which the margin is lost."""
     info, (end, _), rows = parameter_info(model), found.least, []
     other = "upper" if end == "lower" else "lower"
     for change in found.changes[:MOST]:
@@ -84,7 +84,8 @@ def changes_table(model: Any, found: Margins) -> Table:
 
 
 def indices_table(rows: Sequence[Index]) -> Table:
-    """Values whose measurement would decide most, and the chance of rattling at the ends of their ranges."""
+    """Table of the values whose measurement would decide most, with the chance of rattling at the ends of their
+    ranges."""
     shown = [dict(r._asdict()) | dict(zip(("low", "high"), r.quarters, strict=True)) for r in rows if r.telling]
     columns = [Column("value", "label"), Column("of the verdict", "share", shown="%", error="error", digits=0)]
     columns += [Column(f"rattles in its {end} quarter", end, shown="%", digits=0) for end in ("low", "high")]
@@ -93,7 +94,7 @@ def indices_table(rows: Sequence[Index]) -> Table:
 
 
 def indices_note(rows: Sequence[Index]) -> str:
-    """What to measure first, or that the draws do not tell."""
+    """Note on the value to measure first, if the draws show it."""
     if not rows:
         return "All draws agree: no unknown value within its range changes the verdict."
     if not rows[0].telling:
@@ -102,17 +103,17 @@ def indices_note(rows: Sequence[Index]) -> str:
 
 
 MOTIONS = {"locally_periodic": "calm", "circular": "circling", "disordered": "rattling"}
-"""Motions of the centre of a cage among its rollers, as `jaxcage.analysis.motion_label` names them, in plain words."""
+"""Plain words for the motions of a cage among its rollers, by the names of `jaxcage.analysis.motion_label`."""
 MOTION_WORDS = {
     "locally_periodic": "a revolution later the centre of the cage is within a tenth of the clearance of where it was",
     "circular": "the centre whirls around the guide at an almost constant distance from the middle",
     "disordered": "neither: the cage wanders or bounces in its guide",
 }
-"""What each motion means."""
+"""Meaning of each motion."""
 
 
 def cage_verdict(found: xr.Dataset) -> str:
-    """`calm`, `circling`, `rattles` or `rattles in part`, over all speeds and initial states that were computed."""
+    """Verdict over all speeds and initial states: `calm`, `circling`, `rattles` or `rattles in part`."""
     label = found["label"].values
     some = [name for name in MOTIONS if np.any(label == name)]
     if "disordered" in some:
@@ -121,7 +122,7 @@ def cage_verdict(found: xr.Dataset) -> str:
 
 
 def motion_sentence(over: str, found: xr.Dataset) -> str:
-    """The verdict about a bearing with its rollers."""
+    """Sentence of the verdict on a bearing with its rollers."""
     label, rpm = found["label"].transpose("speed", ...).values, found["rpm"].values
     rough = np.any(label == "disordered", axis=1)
     counts = {words: int(np.sum(label == name)) for name, words in MOTIONS.items()}
@@ -135,7 +136,7 @@ def motion_sentence(over: str, found: xr.Dataset) -> str:
 
 
 def motion_table(title: str, found: xr.Dataset) -> Table:
-    """Motion, slip of the cage and largest pocket force by speed."""
+    """Table of the motion and slip of the cage, largest pocket force and friction by speed."""
     rows = []
     for i, rpm in enumerate(found["rpm"].values):
         at = found.isel(speed=i)
@@ -149,11 +150,11 @@ def motion_table(title: str, found: xr.Dataset) -> Table:
 
 
 READ = "cage_slip", "pocket_force_max_N", "friction_power_W"
-"""Variables of a data set that the table shows."""
+"""Variables of a data set that `motion_table` shows."""
 
 
 def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float) -> list[str]:
-    """The makers' rules for the least load beside the load of a bearing."""
+    """Note that compares the load of a bearing [N] with the makers' rules for the minimum load."""
     like, rating = listed_like(bearing), static_load_rating(bearing)
     rules = [
         ("C0/60, with C0 by ISO 76" if like is None else f"C0/60 of {like.designation}", like and like.static_rating)

@@ -1,4 +1,4 @@
-"""Zones found in a sweep or by a search beside the published ones; bifurcations, stable stretches of orbits."""
+"""Tables of zones beside the published ones, of bifurcations, and of stable ranges of orbits."""
 
 import dataclasses
 import math
@@ -20,7 +20,8 @@ Span = tuple[float, float | None]
 
 
 def require_some(found: xr.Dataset, where: str = "") -> None:
-    """**Raises:** `NoResult` if every lane failed, with their number, `where`, and how they ended."""
+    """Require a lane that did not fail. **Raises:** `NoResult` with the number of lanes, `where`, and their
+    outcomes."""
     if failed(found).all():
         said = f"All {found['label'].size} simulations{where} failed ({', '.join(sorted(outcomes(found)))})"
         raise NoResult(f"{said}: try more steps (--steps).")
@@ -34,7 +35,7 @@ def published_zones(published: PublishedCase | None) -> list[Span]:
 
 
 def zone_record(zone: Zone) -> dict[str, Any]:
-    """A zone for tables and documents; an end is None where it runs past the range."""
+    """Record of a zone for tables and documents; an end is None where the zone runs past the range."""
     found: dict[str, Any] = {"kind": zone.kind, "width_rpm": zone.width_rpm, "share": zone.share}
     for end, edge in zip(ENDS, (zone.onset, zone.exit), strict=True):
         found[f"{end}_rpm"] = None if edge is None else edge.speed_rpm
@@ -46,7 +47,7 @@ def zone_record(zone: Zone) -> dict[str, Any]:
 
 
 def zone_span(zone: Zone, lowest: float = -math.inf, highest: float = math.inf) -> tuple[float, float]:
-    """Onset and exit of a zone [rpm], or the limits in place of an end that it does not have."""
+    """Onset and exit of a zone [rpm], with limits in place of a missing end."""
     low, high = zone.onset, zone.exit
     return lowest if low is None else low.speed_rpm, highest if high is None else high.speed_rpm
 
@@ -88,7 +89,8 @@ def motion_tables(
 def unstable_table(
     name: str, found: SynchronousOrbits, loss: UnstableRanges, published: PublishedCase | None, beside: Beside = None
 ) -> Table:
-    """Zones without a stable synchronous orbit, each published (chaotic) zone beside the one it shares most with."""
+    """Table of the unstable ranges of the synchronous orbit, each with the published (chaotic) zones that overlap it
+    most."""
     title = f"Unstable ranges of the synchronous orbit of {name} [rpm], closed below {loss.close_below_rpm:.0f} rpm"
     between = found.lower_rpm, found.upper_rpm
     return _beside_published(title, "unstable_ranges", loss.zones, published, between, beside)
@@ -97,10 +99,8 @@ def unstable_table(
 def _beside_published(
     title: str, key: str, zones: Sequence[Zone], published: PublishedCase | None, range_rpm: Span, beside: Beside
 ) -> Table:
-    """A row for each zone, with the published zones that share most speeds with it.
-
-    The title names published zones that share none, and those outside of the range that was looked at [rpm].
-    """
+    """Table with a row for each zone and the published zones that overlap it most; its title lists published zones
+    without any overlap, and those outside the range searched [rpm]."""
     partners: dict[int | None, list[Span]] = {}
     for span in published_zones(published):
         outside = span[0] > (range_rpm[1] or math.inf) or (span[1] is not None and span[1] < range_rpm[0])
@@ -124,7 +124,7 @@ def _words(spans: Sequence[Span]) -> str:
 
 
 def _partner(span: Span, zones: Sequence[Zone]) -> int | None:
-    """The zone that shares most speeds with a published one; None if none does."""
+    """Index of the zone that overlaps a published one most; None if none does."""
     top = math.inf if span[1] is None else span[1]
     shared = [min(high, top) - max(low, span[0]) for low, high in map(zone_span, zones)]
     best = max(range(len(shared)), key=shared.__getitem__, default=None)
@@ -153,11 +153,11 @@ def _details(title: str, zones: Sequence[Zone], beside: Beside, key: str = "") -
 
 AT_LIMIT_RPM = 1e-6
 SAME = 0.03
-"""Relative distance in places, and in speeds, within which two orbits are the same."""
+"""Relative distance, in positions and in velocities, within which two orbits are the same."""
 
 
 def point_record(point: Point, found: SynchronousOrbits, name: str | None = None) -> dict[str, Any]:
-    """A bifurcation for tables and documents; `name` is that of the edge that it makes."""
+    """Record of a bifurcation for tables and documents; `name` is that of its edge."""
     mu, exact = complex(point.critical), {"period-doubling": 180.0, "fold": 0.0, "branch-point": 0.0}
     return {
         **{n: float(getattr(point, n)) for n in ("speed_rpm", "error_rpm")},
@@ -170,8 +170,8 @@ def point_record(point: Point, found: SynchronousOrbits, name: str | None = None
 
 
 def stretch_table(name: str, found: SynchronousOrbits, beside: Beside = None) -> Table:
-    """Stretches of speed in which a synchronous orbit is stable, and what ends them [rpm]: a kind of bifurcation,
-    `range` where the stretch runs past the range, or `unknown` where the branch was not followed further."""
+    """Table of the speed ranges in which a synchronous orbit is stable, and what ends them [rpm]: a kind of
+    bifurcation, `range` for the end of the search, or `unknown` where the branch was not followed further."""
     rows, columns = [_stretch_record(s, found) for s in found.stretches], []
     for head, end in (("from", "lower"), ("to", "upper")):
         columns += [*speed_columns(head, f"{end}_rpm", beside, digits=2), Column("by", f"{end}_kind")]
@@ -188,7 +188,7 @@ def _stretch_record(stretch: StableRange, found: SynchronousOrbits) -> dict[str,
 
 
 def edge_table(found: SynchronousOrbits, loss: UnstableRanges, beside: Beside = None) -> Table:
-    """Bifurcations at which a stable synchronous orbit begins or ends."""
+    """Table of the bifurcations at which a stable synchronous orbit begins or ends."""
     names = {id(point): name for name, point in loss.edges.items()}
     rows = [point_record(p, found, names.get(id(p))) for p in found.edges]
     for row in rows:
@@ -203,7 +203,7 @@ def edge_table(found: SynchronousOrbits, loss: UnstableRanges, beside: Beside = 
 
 
 def unsettled_notes(found: SynchronousOrbits) -> list[str]:
-    """Bifurcations that were left out, stretches that are not certain, and bifurcations that must have been missed."""
+    """Notes on bifurcations left out, uncertain stable ranges, and changes of stability without a bifurcation."""
     count = found.unsettled
     notes = [f"Left out: {count} bifurcations that half the steps put elsewhere (not converged)"] if count else []
     for s in found.stretches:
@@ -216,7 +216,7 @@ def unsettled_notes(found: SynchronousOrbits) -> list[str]:
 
 
 def coexisting_notes(loss: UnstableRanges) -> list[str]:
-    """One line for each named edge at whose speed another synchronous orbit is stable."""
+    """Notes on the named edges at whose speed another synchronous orbit is stable."""
     notes = []
     for name, orbits in loss.coexisting.items():
         others: list[np.ndarray] = []
