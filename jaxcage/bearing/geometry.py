@@ -55,6 +55,10 @@ class Bearing(eqx.Module):
     palmgren_constant: Scalar = parameter(
         "Pa", 1e8, 1e13, "Palmgren's line-contact constant C_P", default=PALMGREN_CONSTANT
     )
+    effective_length: Scalar | None = parameter(
+        "m", 1e-4, 0.5, "effective roller length, which carries", kind="catalogue", default=None
+    )
+    """None: the whole roller carries."""
     roller_material: Material = eqx.field(default_factory=bearing_steel)
 
     def __check_init__(self) -> None:
@@ -95,7 +99,8 @@ class Bearing(eqx.Module):
     @property
     def raceway_stiffness(self) -> Array:
         """Stiffness of one roller on one raceway, (3) [N/m^(10/9)]."""
-        return line_contact_stiffness(self.palmgren_constant, self.roller_length)
+        length = self.roller_length if self.effective_length is None else self.effective_length
+        return line_contact_stiffness(self.palmgren_constant, length)
 
     @property
     def cage_speed_ratio(self) -> Array:

@@ -34,7 +34,7 @@ from .progress import (
     say,
     shorten_warnings,
 )
-from .subject import read_case
+from .subject import check_case, read_case
 
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
@@ -83,27 +83,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(call: functools.partial[Answer]) -> None:
-    """Read the case, run a command on it, write its files, and print its answer."""
+    """Read the case, run a command on it, write its files, and print its answer. A wrong file is refused before JAX is
+    loaded, which takes seconds."""
+    show: ShowOptions | None = call.keywords.get("show")
+    if show is None:
+        return print_answer(call(), call.keywords["json"])
+    for name in {"subject", "other"} & {*call.keywords}:
+        check_case(call.keywords[name])
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA writes pages about each program that it finds compiled
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells where it stores fonts if there is no home folder
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    show: ShowOptions | None = call.keywords.get("show")
-    if show is not None and show.no_cache:
+    if show.no_cache:
         os.environ["JAXCAGE_CACHE"] = "off"
-    elif show is not None:
+    else:
         shorten_warnings()
         keep_compiled_programs()
     try:
-        answer = call() if show is None else _of_a_case(call, show)
+        answer = _of_a_case(call, show)
     except ArgumentError as error:
         raise _about_options(error, call) from error
     except jax.errors.JaxRuntimeError as error:
         if "RESOURCE_EXHAUSTED" in str(error):
             raise MemoryError from error
         raise
-    print_answer(answer, call.keywords["json"] if show is None else show.json)
+    print_answer(answer, show.json)
     if answer.failure:
         raise NoResult(answer.failure)
 

@@ -31,8 +31,8 @@ READINGS = {"clearance_reading": "radial clearance", "unbalance": "unbalance"}
 def sources_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, left: Sequence[str] = ()) -> Table:
     """All parameters of `model` in the units in which they are read, with their sources.
 
-    **Arguments:** the model; the nested mapping that it was read from, None for a published case; values that are still
-    those of the template, by dotted name.
+    **Arguments:** the model; the nested mapping that it was read from, None for a published case; values on lines
+    that are still as `jaxcage init` wrote them, by dotted name.
     """
     rows = []
     for path, field in walk(model):
@@ -44,7 +44,7 @@ def sources_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, 
         name, first = ".".join(path), path[0]
         part = "model" if name == first else first.replace("_", " ")
         if {name, name.removesuffix("_x").removesuffix("_y")} & set(left):
-            source = "the template's, not yours"
+            source = "as `jaxcage init` wrote it"
         elif first == EXTRA:
             source = "a force of your own"
         else:
