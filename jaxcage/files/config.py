@@ -122,7 +122,7 @@ def _build(part: Part, start: Any, path: tuple[str, ...]) -> eqx.Module:
     start = start if isinstance(start, kind) else None
     arguments = {} if start is None else {f.name: getattr(start, f.name) for f in dataclasses.fields(kind)}
     below = {name: _build(x, getattr(start, name, None), (*path, name)) for name, x in part.parts.items()}
-    arguments |= part.values | below
+    arguments |= {**part.values, **below}
     if isinstance(arguments.get("eccentricity"), Balance):
         arguments["eccentricity"] = _permissible(arguments["eccentricity"], arguments["bearing"], kind)
     try:

@@ -59,7 +59,7 @@ def schema() -> dict[str, Any]:
 def _declared(kind: type[eqx.Module]) -> dict[str, Any]:
     without = [f.name for f in dataclasses.fields(kind) if f.default is f.default_factory is dataclasses.MISSING]
     needed = [name for field in without for name in (NEEDED if field == "forces" else (field,))]
-    found: dict[str, Any] = {"kind": kind.kind} if hasattr(kind, "kind") else {}
+    found: dict[str, Any] = {"kind": name} if (name := getattr(kind, "kind", "")) else {}
     found["values"] = {f.name: _value(f) for f in values(kind)}
     found["tables"] = {name: [each.__name__ for each in several] for name, several in submodules(kind).items()}
     return found | {"needed": needed}
