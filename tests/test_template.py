@@ -117,7 +117,7 @@ def test_what_a_file_changes_of_a_ready_made_bearing(tmp_path: Path):
     [
         ('model = "bearing"\nbase = "1a"', "`base` must be one of nu2310"),
         ('model = "bearing"', "must be given, unless"),
-        ('base = "nu2310"\nlaod = 3', "Key `laod` at the top level is unknown: did you mean `load`?"),
+        ('base = "nu2310"\nlaod = 3', "Key `laod` at the top level is unknown (did you mean `load`?)."),
         ('base = "nu2310"\n[traction]\npeak = 0.01', "`peak` must be above `rest` and `limit`"),
         ('base = "nu2310"\nguidance = "inner"\ninner_land_diameter = "45 mm"', "above the bore, 50 mm"),
         ('base = "nu2310"\ncage_mass = "90 kg"', "`cage_mass` must be at most"),

@@ -221,7 +221,7 @@ def _refuse_unknown(
             if not path and (key in other["values"] or key in other["tables"]):
                 raise ConfigError(f'Key `{key}`{where} needs model = "{subject}".')
         if like := difflib.get_close_matches(key[:100], [*extra, *keys, *nested], 1):
-            raise ConfigError(f"Key `{printable(key)}`{where} is unknown: did you mean `{like[0]}`?")
+            raise ConfigError(f"Key `{printable(key)}`{where} is unknown (did you mean `{like[0]}`?).")
         offered = ", ".join([*extra, *keys, *(f"[{name}]" for name in nested)])
         raise ConfigError(f"Key `{printable(key)}`{where} must be one of {offered}.")
 
