@@ -29,6 +29,16 @@ def designated(given: str) -> str:
     return name
 
 
+DIMENSIONS = {"bore": "d", "outside_diameter": "D", "width": "B", "roller_diameter": "Dw", "roller_length": "Lw"}
+DIMENSIONS |= {"rib_diameter": "D1", "inner_raceway_diameter": "F"}
+"""Parameters of a bearing and their columns."""
+
+
+def dimensions(designation: str) -> dict[str, float]:
+    """Parameters [m] that stand in the catalogue."""
+    return {name: 1e-3 * float(rows()[designation][column]) for name, column in DIMENSIONS.items()}
+
+
 def estimated(designation: str) -> tuple[str, ...]:
     """Parameters of a bearing of the catalogue that nobody prints; those of the paper's bearing are in the paper."""
     if designation == "NU2310":

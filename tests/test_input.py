@@ -2,6 +2,7 @@
 
 import json
 import math
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -64,6 +65,27 @@ def test_wrong_files_are_refused_before_jax_is_loaded(tmp_path: Path):
         assert ends in said and said.startswith("File '")
     assert "none.toml' must be a readable TOML file, but: No such file or directory." in found[-5]
     assert found[-3].startswith("Case '1c' is unknown: it must be one of 1a,")
+
+
+@pytest.mark.parametrize(
+    "case, option, rpm",
+    [
+        ("1a", '--speed "70000 rpm cage"', "62516"),  # 300 m/s/(91.65 mm/2)
+        ("nu2310", '--speed "160000 rpm shaft"', "62516"),  # whose cage turns at 65/162 of that
+        ("mine.toml", "--first 3000 --last 140000", "60153"),  # NU 1014: 300 m/s/(95.25 mm/2), of the shaft
+    ],
+)
+def test_a_speed_at_which_no_cage_runs_is_refused_before_jax_is_loaded(
+    tmp_path: Path, case: str, option: str, rpm: str
+):
+    text = template(short=True).replace("NU2310", "NU1014")
+    (tmp_path / "mine.toml").write_text(text)
+    command = shlex.split(f"{'sweep' if 'last' in option else 'poincare'} {case} {option}")
+    code = "import sys; from jaxcage.cli import main; main(sys.argv[1:]); print('jax' in sys.modules)"
+    ran = subprocess.run(
+        [sys.executable, "-c", code, *command], capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    assert ran.stdout == "False\n" and f"leave the cage at most {rpm} rpm, which is 300 m/s at its land" in ran.stderr
 
 
 def test_init_loads_no_jax(tmp_path: Path):

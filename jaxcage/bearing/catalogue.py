@@ -7,9 +7,9 @@ Creative Commons Attribution License (CC BY). The numbers are taken from it; the
 
 import dataclasses
 import functools
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from .._catalogue import designated, estimated, rows
+from .._catalogue import designated, dimensions, estimated, rows
 from .._errors import ArgumentError
 from .geometry import Bearing
 
@@ -57,25 +57,19 @@ def catalogue() -> dict[str, Listed]:
 def _listed(row: dict[str, str]) -> Listed:
     """A row of `catalogue.csv`."""
     number = lambda name: float(row[name] or "nan")
-    mm = lambda name: 1e-3 * number(name)
+    name = row["designation"]
+    sizes: dict[str, Any] = dimensions(name)
     clearance = next(middle for bore, middle in NORMAL_CLEARANCE.items() if number("d") <= bore)
     bearing = Bearing(
-        bore=mm("d"),
-        outside_diameter=mm("D"),
-        width=mm("B"),
+        **sizes,
         n_rollers=int(row["Z"]),
-        roller_diameter=mm("Dw"),
-        roller_length=mm("Lw"),
-        rib_diameter=mm("D1"),
-        inner_raceway_diameter=mm("F"),
         radial_clearance=1e-6 * clearance,
-        pocket_clearance=POCKET * mm("Dw"),
-        effective_length=mm("Lw") - CHAMFERS,
+        pocket_clearance=POCKET * sizes["roller_diameter"],
+        effective_length=sizes["roller_length"] - CHAMFERS,
     )
     ratings = 1e3 * number("C"), 1e3 * number("C0")
     factors = number("k_r"), number("k_r_brass")
-    speeds, name = (number("n_ref"), number("n_lim")), row["designation"]
-    return Listed(name, bearing, *ratings, *speeds, factors, estimated(name))
+    return Listed(name, bearing, *ratings, number("n_ref"), number("n_lim"), factors, estimated(name))
 
 
 def listed(designation: str) -> Listed:

@@ -10,6 +10,7 @@ from jaxtyping import Array
 
 from .._arguments import is_concrete
 from .._errors import ArgumentError
+from .._kinematics import cage_speed_ratio
 from .._parameters import count, parameter
 from .._pytrees import Scalar
 from .line_contact import PALMGREN_CONSTANT, line_contact_stiffness
@@ -105,7 +106,7 @@ class Bearing(eqx.Module):
     @property
     def cage_speed_ratio(self) -> Array:
         """Cage speed over shaft speed, from (8): (1 - d_w/d_m)/2 [1]."""
-        return jnp.asarray((1 - self.roller_diameter / self.pitch_diameter) / 2)
+        return jnp.asarray(cage_speed_ratio(self.inner_raceway_diameter, self.roller_diameter))
 
     def cage_speed(self, shaft_speed: Scalar, outer_speed: Scalar = 0.0) -> Array:
         """Speed of rollers and cage in pure rolling, w_c = [w_i (1 - d_w/d_m) + w_o (1 + d_w/d_m)]/2 [rad/s], (8).

@@ -11,6 +11,7 @@ import numpy as np
 import jaxcage as jc
 
 from .._errors import InputError
+from .._kinematics import cage_speed_ratio, land_radius, require_cage_rpm
 from .options import Range, flag
 from .progress import say
 
@@ -111,13 +112,7 @@ class Subject:
                 f"itself, but {float(given):g} rpm was given."
             )
         cage = speed if self.own == "cage" else abs(float(self._other(speed)))
-        limit = jc.models.FASTEST / float(self.model.land_radius) * RPM
-        if not 0 < speed or not cage <= limit:
-            raise InputError(
-                f"Option {flag(option)} must be above 0 and leave the cage at most {limit:.0f} rpm, which is "
-                f"{jc.models.FASTEST:g} m/s at its land, but {cage:g} rpm of the cage were given; speeds of the shaft "
-                'are written "20000 rpm shaft".'
-            )
+        require_cage_rpm(flag(option), cage, float(self.model.land_radius))
         return speed
 
     def range(self, over: Range, count: int) -> Any:
@@ -185,20 +180,27 @@ def _is_file(given: str) -> bool:
     return Path(given).suffix.lower() == ".toml" or os.path.exists(given)
 
 
-def check_case(given: str) -> None:
-    """Check the name of a case, or the keys and values of a TOML file, without loading JAX.
+def check_case(given: str, speeds: dict[str, float | None]) -> None:
+    """Check the name of a case, or the keys and values of a TOML file, and speeds by option, without loading JAX.
 
     **Raises:** `InputError`.
     """
-    from ..files import declarations, read_description
+    from ..files import declarations, describe, read_description
 
     cases, bearings = (each["bases"] for each in declarations()["subjects"].values())
-    if given in cases or given.lower() in bearings:
-        return
-    if not _is_file(given):
+    listed = given in cases or given.lower() in bearings
+    if not listed and not _is_file(given):
         known = ", ".join([*cases, *bearings])
         raise InputError(f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file.")
-    read_description(given)
+    found = describe({"base": given.lower()}) if listed else read_description(given)
+    n = found.numbers
+    if n.get("guidance") == "inner" or "outer_speed" in n:  # `Subject.rpm` knows them
+        return
+    for option, speed in speeds.items():
+        if speed is not None:
+            whose = getattr(speed, "whose", found.speeds)
+            ratio = 1.0 if whose == "cage" else cage_speed_ratio(n["inner_raceway_diameter"], n["roller_diameter"])
+            require_cage_rpm(flag(option), speed * ratio, land_radius(n["rib_diameter"], n["guidance_gap"]))
 
 
 def read_case(given: str) -> Subject:

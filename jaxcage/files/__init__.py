@@ -21,6 +21,7 @@ from .description import (
     ConfigError as ConfigError,
     Description as Description,
     declarations as declarations,
+    describe as describe,
     read_description as read_description,
 )
 from .disk import check_writable as check_writable, read_bytes as read_bytes, replacing as replacing, sync as sync

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from .._allowed import ParameterInfo, allowed as must_be, must_be_given, within
-from .._catalogue import designated, estimated
+from .._catalogue import designated, dimensions, estimated
 from .._errors import InputError
 from .disk import read_bytes
 from .ranges import Range, is_range, read_range
@@ -88,6 +88,16 @@ class Description:
     """Dotted names of values from the catalogue that no maker prints."""
     left: tuple[str, ...] = ()
     """Dotted names of values on lines that are still as `jaxcage init` wrote them."""
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """Dimensions [SI] of the bearing and its cage, as far as they are known before anything is built."""
+        bases, bearing = declarations()["subjects"][self.subject]["bases"], self.root.parts.get("bearing")
+        found = {} if self.base is None else {**bases[self.base]}
+        if bearing is not None:
+            found |= dimensions(bearing.ready_made[1]) if bearing.ready_made else {}
+            found |= bearing.values
+        return {**found, **self.root.values}
 
 
 @functools.cache
@@ -192,7 +202,7 @@ def _kind(options: list[str], table: Mapping[str, Any], started: bool, path: tup
 def _require_whole(module: str, given: set[str], path: tuple[str, ...]) -> None:
     """Without a base, what has no default must be given."""
     declared = declarations()["modules"][module]
-    bases = [each["bases"][0] for each in declarations()["subjects"].values() if each["module"] == module]
+    bases = [next(iter(each["bases"])) for each in declarations()["subjects"].values() if each["module"] == module]
     if missing := [_dotted(path, name) for name in declared["needed"] if name not in given]:
         ready = [*(f'base = "{name}"' for name in bases), *(['designation = "NU1014"'] if module == "Bearing" else [])]
         hint = f", unless `{ready[0]}` or the like gives the rest" if ready else ""

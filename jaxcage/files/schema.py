@@ -5,19 +5,26 @@ declaration runs `python -m jaxcage.files.schema`, which writes them to `schema.
 import dataclasses
 import json
 import typing
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
 
-from .._arguments import options
+from .._arguments import enable_x64, options
+from .._parameters import parameters
 from ..bearing import PUBLISHED_CASES
 from ..forces import LAWS
-from ..models import NEEDED, WHOLE_BEARINGS, BearingModel, CageModel
+from ..models import NEEDED, WHOLE_BEARINGS, BearingModel, CageModel, case, whole_bearing
 from .description import SCHEMA
 
 
-SUBJECTS = {"cage": (CageModel, [*PUBLISHED_CASES]), "bearing": (BearingModel, [*WHOLE_BEARINGS])}
-"""Subject of a file -> its model, and names of those to start from."""
+SUBJECTS: dict[str, tuple[type[eqx.Module], Callable[[str], Any], list[str]]] = {
+    "cage": (CageModel, case, [*PUBLISHED_CASES]),
+    "bearing": (BearingModel, whole_bearing, [*WHOLE_BEARINGS]),
+}
+"""Subject of a file -> its model, and those to start from."""
+GUIDE = ("guidance_gap", "rib_diameter", "inner_raceway_diameter", "roller_diameter")
+"""Numbers of the ready-made models from which the speed limit follows."""
 
 
 def submodules(kind: type[eqx.Module]) -> dict[str, tuple[type[eqx.Module], ...]]:
@@ -42,7 +49,7 @@ def values(kind: type[eqx.Module]) -> list[dataclasses.Field]:
 def modules() -> dict[str, type[eqx.Module]]:
     """Every module that a configuration can build, by name."""
     found: dict[str, type[eqx.Module]] = {}
-    left: list[type[eqx.Module]] = [model for model, _ in SUBJECTS.values()]
+    left = [model for model, *_ in SUBJECTS.values()]
     while left:
         kind = left.pop(0)
         found[kind.__name__] = kind
@@ -52,7 +59,11 @@ def modules() -> dict[str, type[eqx.Module]]:
 
 def schema() -> dict[str, Any]:
     """The declarations of all modules, as JSON can hold them."""
-    subjects = {name: {"module": model.__name__, "bases": bases} for name, (model, bases) in SUBJECTS.items()}
+    guide = lambda model: {name: float(parameters(model)[name]) for name in GUIDE}
+    subjects = {
+        name: {"module": model.__name__, "bases": {base: guide(make(base)) for base in bases}}
+        for name, (model, make, bases) in SUBJECTS.items()
+    }
     return {"subjects": subjects, "modules": {name: _declared(kind) for name, kind in modules().items()}}
 
 
@@ -72,4 +83,8 @@ def _value(field: dataclasses.Field) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    SCHEMA.write_text(json.dumps(schema(), indent=1) + "\n", encoding="utf-8")
+    enable_x64()
+    found = schema()
+    lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(each)}" for name, each in found["modules"].items())
+    text = f'{{"subjects": {json.dumps(found["subjects"])},\n"modules": {{\n{lines}\n}}}}\n'
+    SCHEMA.write_text(text, encoding="utf-8")
