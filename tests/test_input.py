@@ -34,7 +34,7 @@ def test_every_base_has_the_first_law_of_each_table():
 
 WRONG = {
     "guidence_gap = 1": "Key `guidence_gap` at the top level is unknown (did you mean `guidance_gap`?).",
-    'guidance_gap = "0,25 mm"': 'is "0,25 mm", but numbers are written with a point and without commas.',
+    'guidance_gap = "0,25 mm"': 'is "0,25 mm": numbers are written with a point and without commas.',
     "guidance_gap = 0.25": '1e-05 to 0.005 m, but is 0.25 m; with its unit it is written "0.25 mm".',
     'guidance_gap = "0.25 kg"': 'has the unit "kg", where a unit like "m" is wanted.',
     'guidance_gap = "-0.25 mm"': 'to 0.005 m, but is -0.00025 m (given as "-0.25 mm").',

@@ -88,9 +88,10 @@ def _run(call: functools.partial[Answer]) -> None:
     show: ShowOptions | None = call.keywords.get("show")
     if show is None:
         return print_answer(call(), call.keywords["json"])
-    over: Any = call.keywords.get("over")
-    usual = over is None or over == inspect.signature(call.func).parameters["over"].default
-    speeds = {"speed": call.keywords.get("speed")} if usual else {"first": over.first, "last": over.last}
+    speeds = {"speed": call.keywords.get("speed")}
+    over = call.keywords.get("over")
+    if over is not None and over != inspect.signature(call.func).parameters["over"].default:
+        speeds |= {"first": over.first, "last": over.last}
     for name in {"subject", "other"} & {*call.keywords}:
         check_case(call.keywords[name], speeds)
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA writes pages about each program that it finds compiled

@@ -133,7 +133,7 @@ def describe(table: Mapping[str, Any]) -> Description:
     base, speeds = table.get("base"), table.get("speeds", "shaft" if subject == "bearing" else "cage")
     if speeds not in WHOSE:
         raise ConfigError(f"`speeds` must be one of {', '.join(WHOSE)}, but is {shown(speeds)}.")
-    if "base" in table and base not in bases:
+    if "base" in table and base not in [*bases]:  # of any type
         raise ConfigError(f"`base` must be one of {', '.join(bases)}, but is {shown(base)}.")
     ranges: Ranges = {}
     rest = {key: value for key, value in table.items() if key not in ("speeds", "model", "base")}
