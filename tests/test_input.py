@@ -123,7 +123,12 @@ def test_what_is_estimated_of_a_catalogue_bearing_is_named(tmp_path: Path):
     path.write_text('base = "1a"\n[bearing]\ndesignation = "NU1020"\npocket_clearance = "0.2 mm"')
     rollers = "n_rollers", "roller_diameter", "roller_length"
     names = "radial_clearance", "effective_length", *rollers
-    assert read_bearing(path).estimated == tuple(f"bearing.{name}" for name in names)
+    file = read_bearing(path)
+    assert file.estimated == tuple(f"bearing.{name}" for name in names)
+    rows = jc.show.sources_table(file.model, file.table, file.left).records
+    found = {row["name"].removeprefix("bearing."): row["from"] for row in rows if row["name"].startswith("bearing.")}
+    assert {name for name, source in found.items() if source == "estimated for the catalogue"} == {*names}
+    assert (found["bore"], found["pocket_clearance"]) == ("catalogue, NU1020", "this file")
     path.write_text('base = "1a"\n[bearing]\ndesignation = "NU2310"')
     assert read_bearing(path).estimated == ()
 

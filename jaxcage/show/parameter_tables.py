@@ -5,6 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .._catalogue import designated, estimated
 from .._parameters import EXTRA, get, readings_of, walk
 from ..files import configuration, is_range
 from ..models import AbstractForcedSystem
@@ -83,6 +84,8 @@ def _in_file(path: tuple[str, ...], table: Mapping[str, Any]) -> str:
         return "best guess in a range of this file" if isinstance(here, str) and is_range(here) else "this file"
     for (made, key), words in READY_MADE.items():
         if path[0] == made and isinstance(part, Mapping) and key in part:
+            if key == "designation" and path[-1] in estimated(designated(part[key])):
+                return "estimated for the catalogue"
             return "default" if path[1:] == ("temperature",) else words.format(part[key])
     replaced = isinstance(part, Mapping) and "kind" in part  # by another law than that of the base
     return f"case {table['base']}" if "base" in table and not replaced else "default"
