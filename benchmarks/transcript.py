@@ -38,7 +38,7 @@ def show(command: str, folder: str) -> None:
 def main() -> None:
     """Print the session."""
     with tempfile.TemporaryDirectory() as folder:
-        show(f"jaxcage init {FILE}", folder)
+        show(f"jaxcage init {FILE} --full", folder)
         path = pathlib.Path(folder, FILE)
         text = path.read_text(encoding="utf-8")
         for name, value in VALUES.items():

@@ -9,7 +9,7 @@
 # ---
 # %% [markdown]
 # # Bring your own bearing
-# A bearing is a TOML file. `jaxcage init my_bearing.toml` writes one with every value explained; here is a shorter one,
+# A bearing is a TOML file. `jaxcage init my_bearing.toml` writes one to start from; here is another one,
 # an NU2310 with a smaller gap, better balance and thicker, colder oil.
 
 # %%

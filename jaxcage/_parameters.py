@@ -9,7 +9,7 @@ import math
 import reprlib
 from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import equinox as eqx
 import jax
@@ -18,40 +18,22 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, PyTree
 
+from ._allowed import (
+    ROUNDING as ROUNDING,
+    SOURCES as SOURCES,
+    UNKNOWN as UNKNOWN,
+    Kind as Kind,
+    ParameterInfo as ParameterInfo,
+    allowed as allowed,
+    must_be_given as must_be_given,
+    within as within,
+)
 from ._errors import ArgumentError, InputError
 
 
 M = TypeVar("M", bound=eqx.Module)
 
 
-Kind = Literal["drawing", "catalogue", "oil", "operating", "unknown", "fixed"]
-SOURCES: dict[Kind, str] = {
-    "drawing": "drawing, or weighed and measured",
-    "catalogue": "catalogue of the bearing",
-    "oil": "data sheet of the oil",
-    "operating": "the machine",
-    "unknown": "nobody knows it unless it is measured",
-    "fixed": "constant of nature, of a law, or numerical",
-}
-"""Usual source of a value, by kind of parameter."""
-
-
-@dataclasses.dataclass(frozen=True)
-class ParameterInfo:
-    """Declaration of a parameter: SI unit, closed range of allowed values, description, source."""
-
-    unit: str
-    lower: float
-    upper: float
-    text: str
-    kind: Kind = "fixed"
-    """Kind of source, see `SOURCES`."""
-    source: str = ""
-    """Source of the value, or how to measure it."""
-
-
-UNKNOWN = "?"
-"""Unit of a parameter that is not declared."""
 EXTRA = "extra"
 """Prefix of the parameters of user-defined laws, declared or not, e.g. `extra.MyDrag.coefficient`."""
 
@@ -107,11 +89,6 @@ def reading(text: str, **options: str) -> Any:
     that holds one calls `require_readings` when it is created."""
     metadata = {"choice": tuple(options), "text": text, "readings": options}
     return eqx.field(static=True, default=NOT_GIVEN, metadata=metadata)
-
-
-def must_be_given(options: dict[str, str]) -> str:
-    """Message for a reading that was not chosen."""
-    return "must be given, " + " or ".join(f'"{name}" ({words})' for name, words in options.items())
 
 
 def require_readings(module: eqx.Module) -> None:
@@ -189,7 +166,7 @@ def _declared(structure: Any, is_number: tuple[bool, ...]) -> tuple[Declared, ..
             elif isinstance(value, tuple) and all(isinstance(each, eqx.Module) for each in value):
                 for each in value:
                     yield from below(each, (*path, *part_path(each)), part_path(each)[0] == EXTRA)
-            elif {"parameter", "choice", "count"} & set(field.metadata):
+            elif value is not None and {"parameter", "choice", "count"} & set(field.metadata):
                 yield here, field
             elif own and value is True and not field.metadata.get("static"):
                 yield here, parameter(UNKNOWN, -math.inf, math.inf, field.name.replace("_", " "))
@@ -329,22 +306,6 @@ def _changed(module: Any, changes: Mapping[tuple[str, ...], Any]) -> Any:
         if check := vars(kind).get("__check_init__"):
             check(copy)
     return copy
-
-
-def allowed(info: ParameterInfo) -> str:
-    """Allowed range of a parameter, as messages state it."""
-    unit = "" if info.unit in ("1", UNKNOWN) else f" {info.unit}"
-    return f"must be a number from {info.lower:g} to {info.upper:g}{unit}"
-
-
-ROUNDING = 1e-12
-"""Relative tolerance for rounding in unit conversions."""
-
-
-def within(numbers: Any, lower: float, upper: float) -> np.ndarray:
-    """True for numbers from `lower` to `upper`, up to rounding: 10 um, converted, is a little less than 1e-5 m."""
-    given = np.asarray(numbers, dtype=float)
-    return np.asarray((given >= lower - ROUNDING * abs(lower)) & (given <= upper + ROUNDING * abs(upper)))
 
 
 def _require_range(name: str, value: Any, info: ParameterInfo) -> None:

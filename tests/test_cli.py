@@ -103,7 +103,7 @@ def test_bad_arguments(
     [
         ("guidance_gap = ", "must be valid TOML"),
         ("base = '9'", "`base` must be one of"),
-        ("base = '1a'\n[film]\nwidth = 4e-3", "Key `width` in [film] must be one of"),
+        ("base = '1a'\n[film]\nwidth = 4e-3", "Key `width` in [film] is unknown (did you mean `land_width`?)."),
         ("base = '1a'\nguidance_gap = '0.45 m'", 'but is 0.45 m (given as "0.45 m")'),
         ("base = '1a'\nguidance_gap = '0.45 smoots'", '"smoots"'),
         ("base = '1a'\nguidance_gap = nan", "but is nan m"),

@@ -10,6 +10,7 @@ from jaxtyping import Array
 
 from .._arguments import is_concrete
 from .._errors import ArgumentError
+from .._kinematics import cage_speed_ratio
 from .._parameters import count, parameter
 from .._pytrees import Scalar
 from .line_contact import PALMGREN_CONSTANT, line_contact_stiffness
@@ -55,6 +56,10 @@ class Bearing(eqx.Module):
     palmgren_constant: Scalar = parameter(
         "Pa", 1e8, 1e13, "Palmgren's line-contact constant C_P", default=PALMGREN_CONSTANT
     )
+    effective_length: Scalar | None = parameter(
+        "m", 1e-4, 0.5, "effective roller length, which carries", kind="catalogue", default=None
+    )
+    """None: the whole roller carries."""
     roller_material: Material = eqx.field(default_factory=bearing_steel)
 
     def __check_init__(self) -> None:
@@ -95,12 +100,13 @@ class Bearing(eqx.Module):
     @property
     def raceway_stiffness(self) -> Array:
         """Stiffness of one roller on one raceway, (3) [N/m^(10/9)]."""
-        return line_contact_stiffness(self.palmgren_constant, self.roller_length)
+        length = self.roller_length if self.effective_length is None else self.effective_length
+        return line_contact_stiffness(self.palmgren_constant, length)
 
     @property
     def cage_speed_ratio(self) -> Array:
         """Cage speed over shaft speed, from (8): (1 - d_w/d_m)/2 [1]."""
-        return jnp.asarray((1 - self.roller_diameter / self.pitch_diameter) / 2)
+        return jnp.asarray(cage_speed_ratio(self.inner_raceway_diameter, self.roller_diameter))
 
     def cage_speed(self, shaft_speed: Scalar, outer_speed: Scalar = 0.0) -> Array:
         """Speed of rollers and cage in pure rolling, w_c = [w_i (1 - d_w/d_m) + w_o (1 + d_w/d_m)]/2 [rad/s], (8).

@@ -29,6 +29,7 @@ def init(
     path: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FILE")],
     *,
     model: Literal["cage", "bearing"] = "cage",
+    full: bool = False,
     json: bool = False,
 ) -> Answer:
     """A commented TOML file that describes a bearing, to be changed and given to the other commands.
@@ -36,10 +37,13 @@ def init(
     Args:
         path: Where to write it, e.g. my_bearing.toml; an existing file is left alone.
         model: Describe the cage under prescribed forces, or the bearing with its rollers.
+        full: Write every option with its explanation; otherwise what must be known, in at most 40 lines.
         json: Print one JSON document on standard output.
     """
-    written = jc.files.write_template(path, model)
-    what = "an NU2310 with its rollers" if model == "bearing" else "the NU2310 of case 1a"
+    from ..files import write_template  # the library as a whole takes seconds to load
+
+    written = write_template(path, model, short=not full)
+    what = "an NU2310 with its rollers" if model == "bearing" else "the cage of an NU2310"
     said = f"Written: {written}. It describes {what}: change the values and go on, e.g. with"
     commands = [f"  jaxcage {command} {path}" for command in ("statics", "sweep", "zones", "report")]
     return Answer(said, notes=commands, document={"file": str(written)})

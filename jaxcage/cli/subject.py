@@ -11,6 +11,7 @@ import numpy as np
 import jaxcage as jc
 
 from .._errors import InputError
+from .._kinematics import cage_speed_ratio, land_radius, require_cage_rpm
 from .options import Range, flag
 from .progress import say
 
@@ -111,13 +112,7 @@ class Subject:
                 f"itself, but {float(given):g} rpm was given."
             )
         cage = speed if self.own == "cage" else abs(float(self._other(speed)))
-        limit = jc.models.FASTEST / float(self.model.land_radius) * RPM
-        if not 0 < speed or not cage <= limit:
-            raise InputError(
-                f"Option {flag(option)} must be above 0 and leave the cage at most {limit:.0f} rpm, which is "
-                f"{jc.models.FASTEST:g} m/s at its land, but {cage:g} rpm of the cage were given; speeds of the shaft "
-                'are written "20000 rpm shaft".'
-            )
+        require_cage_rpm(flag(option), cage, float(self.model.land_radius))
         return speed
 
     def range(self, over: Range, count: int) -> Any:
@@ -164,39 +159,66 @@ class Subject:
         """Entries of the case in every document, and sentences about it; best guesses only where these were taken."""
         from .._parameters import readings_of  # loads JAX
 
-        left = () if self.file is None else self.file.left
+        left, estimated = ((), ()) if self.file is None else (self.file.left, self.file.estimated)
         guesses = [] if by_ranges else [u.label for u in self.unknowns]
         document: dict[str, Any] = {"readings": {name: way for name, (way, _) in readings_of(self.model).items()}}
         document |= {} if self.shaft is None else {"cage_speed_ratio": 1 / self.shaft}
         document |= {"load_N": float(self.model.load)} if self.with_rollers else {}
-        document |= {} if self.file is None else {"left_as_in_template": left, "best_guesses": guesses}
+        document |= (
+            {} if self.file is None else {"left_as_in_template": left, "estimated": estimated, "best_guesses": guesses}
+        )
         notes = {
             "Readings": [*filter(None, [jc.show.readings_words(self.model)])],
-            "As the template has them, of another bearing": left,
+            "Lines still as `jaxcage init` wrote them (change or delete the comment of one that is yours)": left,
+            "Estimated for the catalogue, which no maker prints": estimated,
             "Best guesses of values known within ranges only": guesses,
         }
         return document, [f"{what}: {', '.join(values)}" for what, values in notes.items() if values]
 
 
+def _is_file(given: str) -> bool:
+    return Path(given).suffix.lower() == ".toml" or os.path.exists(given)
+
+
+def check_case(given: str, speeds: dict[str, float | None]) -> None:
+    """Check the name of a case, or the keys and values of a TOML file, and speeds by option, without loading JAX.
+
+    **Raises:** `InputError`.
+    """
+    from ..files import declarations, describe, read_description
+
+    cases, bearings = (each["bases"] for each in declarations()["subjects"].values())
+    listed = given in cases or given.lower() in bearings
+    if not listed and not _is_file(given):
+        known = ", ".join([*cases, *bearings])
+        raise InputError(f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file.")
+    found = describe({"base": given.lower()}) if listed else read_description(given)
+    n = found.numbers
+    if n.get("guidance") == "inner" or "outer_speed" in n:  # `Subject.rpm` knows them
+        return
+    for option, speed in speeds.items():
+        if speed is not None:
+            whose = getattr(speed, "whose", found.speeds)
+            ratio = 1.0 if whose == "cage" else cage_speed_ratio(n["inner_raceway_diameter"], n["roller_diameter"])
+            require_cage_rpm(flag(option), speed * ratio, land_radius(n["rib_diameter"], n["guidance_gap"]))
+
+
 def read_case(given: str) -> Subject:
-    """A case or TOML file by its name.
+    """A case or TOML file that passed `check_case`.
 
     A broken design rule and an oil that is too thin are reported on standard error.
 
     **Raises:** `InputError`.
     """
-    cases, bearings = jc.bearing.PUBLISHED_CASES, jc.models.WHOLE_BEARINGS
+    cases = jc.bearing.PUBLISHED_CASES
     if given in cases:
         found = Subject(given, jc.case(given), cases[given])
-    elif Path(given).suffix.lower() == ".toml" or os.path.exists(given):
+    elif given.lower() in jc.models.WHOLE_BEARINGS:
+        found = Subject(given.lower(), jc.whole_bearing(given))
+    else:
         file, name = jc.files.read_bearing(given), Path(given).stem
         name = "".join(c if c.isprintable() and c != "$" else "_" for c in name)
         found = Subject(name, file.model, None, file, given)
-    elif given.lower() in bearings:
-        found = Subject(given.lower(), jc.whole_bearing(given))
-    else:
-        known = ", ".join([*cases, *bearings])
-        raise InputError(f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file.")
     if broken := jc.bearing.design_rule_violations(found.model.bearing, found.model.guidance_gap):
         say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
     for doubt in found.model.lubricant.doubts():

@@ -34,7 +34,7 @@ from .progress import (
     say,
     shorten_warnings,
 )
-from .subject import read_case
+from .subject import check_case, read_case
 
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
@@ -82,27 +82,37 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(call: functools.partial[Answer]) -> None:
-    """Read the case, run a command on it, write its files, and print its answer."""
-    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA logs pages about every cached program
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it reports its font cache if there is no home folder
+    """Read the case, run a command on it, write its files, and print its answer. A wrong file is refused before JAX is
+    loaded, which takes seconds."""
+    show: ShowOptions | None = call.keywords.get("show")
+    if show is None:
+        return print_answer(call(), call.keywords["json"])
+    speeds = {"speed": call.keywords.get("speed")}
+    over = call.keywords.get("over")
+    if over is not None and over != inspect.signature(call.func).parameters["over"].default:
+        speeds |= {"first": over.first, "last": over.last}
+    check_case(call.keywords["subject"], speeds)
+    if "other" in call.keywords:
+        check_case(call.keywords["other"], {})
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA writes pages about each program that it finds compiled
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells where it stores fonts if there is no home folder
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    show: ShowOptions | None = call.keywords.get("show")
-    if show is not None and show.no_cache:
+    if show.no_cache:
         os.environ["JAXCAGE_CACHE"] = "off"
-    elif show is not None:
+    else:
         shorten_warnings()
         keep_compiled_programs()
     try:
-        answer = call() if show is None else _of_a_case(call, show)
+        answer = _of_a_case(call, show)
     except ArgumentError as error:
         raise _about_options(error, call) from error
     except jax.errors.JaxRuntimeError as error:
         if "RESOURCE_EXHAUSTED" in str(error):
             raise MemoryError from error
         raise
-    print_answer(answer, call.keywords["json"] if show is None else show.json, show is not None and show.details)
+    print_answer(answer, show.json, show.details)
     if answer.failure:
         raise NoResult(answer.failure)
 

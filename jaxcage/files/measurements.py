@@ -16,8 +16,8 @@ import re
 from pathlib import Path
 from typing import Any, Literal
 
+from .description import ConfigError
 from .disk import read_bytes
-from .schema import ConfigError
 from .units import Whose, printable, split_owner, to_si
 
 

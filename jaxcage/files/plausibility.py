@@ -4,8 +4,9 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from .._parameters import within
 from ..models import BearingModel, CageModel
-from .schema import ConfigError
+from .description import ConfigError
 
 
 HEAVIEST = 8900.0
@@ -36,6 +37,10 @@ def _checks(model: CageModel | BearingModel) -> Iterator[tuple[bool, str, str]]:
     yield raceway >= outside, "bearing.outside_diameter", must
     length, width = mm(b.roller_length), mm(b.width)
     yield length >= width, "bearing.roller_length", f"fit into the rings, {width:g} mm, but is {length:g} mm"
+    if b.effective_length is not None:
+        carries = mm(b.effective_length)
+        must = f"be at most `roller_length`, {length:g} mm, but is {carries:g} mm"
+        yield not within(carries, 0.0, length), "bearing.effective_length", must
     pocket, room = mm(b.roller_diameter + b.pocket_clearance), math.pi * pitch / b.n_rollers
     must = f"leave a bar between pockets, which are {room:.4g} mm apart, but makes them {pocket:g} mm wide"
     yield pocket >= room, "bearing.pocket_clearance", must

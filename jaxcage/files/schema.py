@@ -1,22 +1,30 @@
-"""Tables, keys, units, ranges and options of a configuration, derived from the fields of the modules."""
+"""Tables, keys, units, ranges and options of a configuration, derived from the fields of the modules. Whoever changes a
+declaration runs `python -m jaxcage.files.schema`, which writes them to `schema.json`, where `description` reads them.
+"""
 
 import dataclasses
-import math
+import json
 import typing
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
 
-from .._arguments import options
-from .._errors import InputError
-from .._parameters import ParameterInfo, allowed as must_be, within
+from .._arguments import enable_x64, options
+from .._parameters import parameters
+from ..bearing import PUBLISHED_CASES
 from ..forces import LAWS
-from .ranges import Range, is_range, read_range
-from .units import printable, shown, to_si
+from ..models import NEEDED, WHOLE_BEARINGS, BearingModel, CageModel, case, whole_bearing
+from .description import SCHEMA
 
 
-class ConfigError(InputError):
-    """A configuration that is refused; the message is one sentence that names the key and what it may be."""
+SUBJECTS: dict[str, tuple[type[eqx.Module], Callable[[str], Any], list[str]]] = {
+    "cage": (CageModel, case, [*PUBLISHED_CASES]),
+    "bearing": (BearingModel, whole_bearing, [*WHOLE_BEARINGS]),
+}
+"""Subject of a file -> its model, and those to start from."""
+GUIDE = ("guidance_gap", "rib_diameter", "inner_raceway_diameter", "roller_diameter")
+"""Numbers of the ready-made models from which the speed limit follows."""
 
 
 def submodules(kind: type[eqx.Module]) -> dict[str, tuple[type[eqx.Module], ...]]:
@@ -38,51 +46,45 @@ def values(kind: type[eqx.Module]) -> list[dataclasses.Field]:
     return [f for f in dataclasses.fields(kind) if {"parameter", "choice", "count"} & set(f.metadata)]
 
 
-def read_value(name: str, value: Any, field: dataclasses.Field) -> Any:
-    """`value` as the configuration gives it, checked against the declaration of `field`.
-
-    **Raises:** `ConfigError`.
-    """
-    if "choice" in field.metadata:
-        if value not in field.metadata["choice"]:
-            offered = ", ".join(field.metadata["choice"])
-            raise ConfigError(f"`{name}` must be one of {offered}, but is {shown(value)}.")
-        return value
-    if "count" in field.metadata:
-        lower, upper = field.metadata["count"]
-        if isinstance(value, bool) or not isinstance(value, int) or not lower <= value <= upper:
-            raise ConfigError(f"`{name}` must be a whole number from {lower} to {upper}, but is {shown(value)}.")
-        return value
-    return _read_number(name, value, field.metadata["parameter"])
+def modules() -> dict[str, type[eqx.Module]]:
+    """Every module that a configuration can build, by name."""
+    found: dict[str, type[eqx.Module]] = {}
+    left = [model for model, *_ in SUBJECTS.values()]
+    while left:
+        kind = left.pop(0)
+        found[kind.__name__] = kind
+        left += [below for several in submodules(kind).values() for below in several]
+    return found
 
 
-class Known(float):
-    """Best guess of a value that is known within a range only."""
+def schema() -> dict[str, Any]:
+    """The declarations of all modules, as JSON can hold them."""
+    guide = lambda model: {name: float(parameters(model)[name]) for name in GUIDE}
+    subjects = {
+        name: {"module": model.__name__, "bases": {base: guide(make(base)) for base in bases}}
+        for name, (model, make, bases) in SUBJECTS.items()
+    }
+    return {"subjects": subjects, "modules": {name: _declared(kind) for name, kind in modules().items()}}
 
-    range: Range
 
-    def __new__(cls, found: Range) -> "Known":
-        number = super().__new__(cls, found.best)
-        number.range = found
-        return number
+def _declared(kind: type[eqx.Module]) -> dict[str, Any]:
+    without = [f.name for f in dataclasses.fields(kind) if f.default is f.default_factory is dataclasses.MISSING]
+    needed = [name for field in without for name in (NEEDED if field == "forces" else (field,))]
+    found: dict[str, Any] = {"kind": name} if (name := getattr(kind, "kind", "")) else {}
+    found["values"] = {f.name: _value(f) for f in values(kind)}
+    found["tables"] = {name: [each.__name__ for each in several] for name, several in submodules(kind).items()}
+    return found | {"needed": needed}
 
 
-def _read_number(name: str, value: Any, info: ParameterInfo) -> float:
-    unit = "" if info.unit == "1" else f" {info.unit}"
-    allowed = f"`{name}` {must_be(info)}"
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ConfigError(f"{allowed}, but is {shown(value)}.")
-    try:
-        if isinstance(value, str) and is_range(value):
-            number = Known(read_range(value, info.unit))
-        else:
-            number = to_si(value, info.unit) if isinstance(value, str) else float(value)
-    except ValueError as error:
-        raise ConfigError(f"{allowed}, but {error}.") from error
-    except OverflowError as error:  # of a whole number
-        raise ConfigError(f"{allowed}, but is {shown(value)}.") from error
-    for each in (number.range.lower, number.range.upper) if isinstance(number, Known) else (number,):
-        if not math.isfinite(each) or not within(each, info.lower, info.upper):
-            given = f' (given as "{printable(value)}")' if isinstance(value, str) else ""
-            raise ConfigError(f"{allowed}, but is {each:g}{unit}{given}.")
-    return number
+def _value(field: dataclasses.Field) -> dict[str, Any]:
+    if info := field.metadata.get("parameter"):
+        return {name: getattr(info, name) for name in ("unit", "lower", "upper")}
+    return {key: field.metadata[key] for key in ("choice", "count", "readings") if key in field.metadata}
+
+
+if __name__ == "__main__":
+    enable_x64()
+    found = schema()
+    lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(each)}" for name, each in found["modules"].items())
+    text = f'{{"subjects": {json.dumps(found["subjects"])},\n"modules": {{\n{lines}\n}}}}\n'
+    SCHEMA.write_text(text, encoding="utf-8")

@@ -1,68 +1,55 @@
 """A configuration to start from: every value with its unit, its meaning and where it comes from."""
 
 import contextlib
-import functools
-import tomllib
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator
 from pathlib import Path
-from string import Template
-from typing import Any, Literal
+from typing import Literal
 
 from .._errors import InputError
-from .._parameters import parameters
-from ..models import case, whole_bearing
 
 
 Subject = Literal["cage", "bearing"]
 """Subject of a file: the cage in its land, or the whole bearing."""
-CHOSEN = ("model", "speeds", "clearance_reading", "unbalance", "kind")
+CHOSEN = ("model", "speeds", "guidance", "clearance_reading", "unbalance", "kind")
 """Keys of the templates that are no numbers of the NU2310."""
 
 
-@functools.cache
-def template(subject: Subject = "cage") -> str:
-    """The commented TOML text that `jaxcage init` writes; `load_model` accepts it as it is.
+TABLE = re.compile(r"\s*\[([^\[\]]+)\]\s*(?:#.*)?")
+"""Line that begins a table."""
 
-    Dimensions stand in the text. Constants that the paper does not print are filled in from those of its cases, and
-    derived ones of the whole bearing from them.
+
+def template(subject: Subject = "cage", short: bool = False) -> str:
+    """The commented TOML text that `jaxcage init --full` writes, with every option; or the `short` one of `jaxcage
+    init`, with what must be known. `load_model` accepts both as they are.
     """
-    if subject == "cage":
-        file, model = "template.toml", case("1a")
-    else:
-        file, model = "whole_template.toml", whole_bearing("nu2310")
-    text = Path(__file__).with_name(file).read_text(encoding="utf-8")
-    numbers = parameters(model) | {"land_width_mm": 1e3 * model.film.land_width}
-    filled = Template(text).substitute({name: f"{float(value):.4g}" for name, value in numbers.items()})
-    return "\n".join(map(_aligned, filled.splitlines())) + "\n"
+    file = f"{'short_' * short}{'whole_' * (subject == 'bearing')}template.toml"
+    return Path(__file__).with_name(file).read_text(encoding="utf-8")
 
 
-def left_as_written(table: Mapping[str, Any], subject: Subject = "cage") -> tuple[str, ...]:
-    """Dotted names of the values of a nested mapping that are still those of the template, the NU2310's."""
-    return tuple(_alike(table, tomllib.loads(template(subject)), ()))
+def left_as_written(text: str, subject: Subject = "cage") -> tuple[str, ...]:
+    """Dotted names of the values of a TOML text whose lines, comments included, are still those of a template."""
+    written = {found for short in (True, False) for found in _lines(template(subject, short))}
+    return tuple(dict.fromkeys(name for name, line in _lines(text) if (name, line) in written))
 
 
-def _alike(given: Mapping[str, Any], written: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
-    for key, value in given.items():
-        other = written.get(key)
-        if isinstance(value, Mapping) and isinstance(other, Mapping):
-            yield from _alike(value, other, (*path, key))
-        elif value == other and key not in CHOSEN:
-            yield ".".join((*path, key))
+def _lines(text: str) -> Iterator[tuple[str, str]]:
+    """Dotted name and line of every value that is a number of a bearing."""
+    table = ""
+    for line in text.splitlines():
+        if head := TABLE.fullmatch(line):
+            table = f"{head[1].strip()}."
+        elif (key := line.partition("=")[0].strip()).isidentifier() and key not in CHOSEN:
+            yield table + key, line.strip()
 
 
-def _aligned(line: str) -> str:
-    """`line` with its comment in the same column as the others."""
-    value, sign, comment = line[2:].partition(" # ")  # the first two may be the sign of an option
-    return f"{(line[:2] + value).rstrip():<34} # {comment}" if sign else line
-
-
-def write_template(path: str | Path, subject: Subject = "cage") -> Path:
-    """Write the template of a cage, or of a whole bearing, to a new file.
+def write_template(path: str | Path, subject: Subject = "cage", short: bool = False) -> Path:
+    """Write a template, see there, to a new file.
 
     **Raises:** `ValueError`, one sentence, if the name does not end in `.toml`, if the file is there already, or if it
     cannot be written.
     """
-    target, text = Path(path), template(subject)
+    target, text = Path(path), template(subject, short)
     if target.suffix.lower() != ".toml":
         raise InputError(f"File '{path}' must end in .toml, so that the commands take it for a description.")
     try:

@@ -10,12 +10,11 @@ from typing import Any
 import equinox as eqx
 
 from ..models import AbstractForcedSystem, BearingModel, CageModel
+from .description import ConfigError
 from .disk import replacing
 from .ranges import Range
-from .schema import ConfigError, submodules, values
-
-
-_TABLE = re.compile(r"\s*\[([^\[\]]+)\]\s*(?:#.*)?")
+from .schema import submodules, values
+from .template import TABLE
 
 
 def configuration(model: AbstractForcedSystem) -> dict[str, Any]:
@@ -38,7 +37,7 @@ def configuration(model: AbstractForcedSystem) -> dict[str, Any]:
 def _table(module: eqx.Module) -> dict[str, Any]:
     fields = values(type(module))
     plain = lambda f: float(getattr(module, f.name)) if "parameter" in f.metadata else getattr(module, f.name)
-    table: dict[str, Any] = {f.name: plain(f) for f in fields}
+    table: dict[str, Any] = {f.name: plain(f) for f in fields if getattr(module, f.name) is not None}
     for name, options in submodules(type(module)).items():
         if (below := getattr(module, name, None)) is not None:
             table[name] = ({"kind": below.kind} if len(options) > 1 else {}) | _table(below)
@@ -75,7 +74,7 @@ def with_ranges(text: str, ranges: Mapping[str, tuple[Range, str]]) -> str:
     """
     lines, table, left = text.splitlines(), "", dict(ranges)
     for i, line in enumerate(lines):
-        if head := _TABLE.fullmatch(line):
+        if head := TABLE.fullmatch(line):
             table = head[1].strip()
             continue
         value = re.match(r'(\s*([A-Za-z0-9_]+)\s*=\s*)("[^"]*"|\'[^\']*\')(\s*)(.*)', line)

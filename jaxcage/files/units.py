@@ -43,9 +43,9 @@ def to_si(text: str, unit: str) -> float:
     unit, and for one of another dimension, where the radian counts as a dimension: 3000 1/min may be revolutions.
     """
     if _COMMA.match(text):
-        raise ValueError(f'is "{printable(text)}", but numbers are written with a point and without commas')
+        raise ValueError(f'is "{printable(text)}": numbers are written with a point and without commas')
     if _DASH.match(text):
-        raise ValueError(f'is "{printable(text)}", but a range is written with two points, such as "1e4 .. 1e6 N/m"')
+        raise ValueError(f'is "{printable(text)}": a range is written with two points, such as "1e4 .. 1e6 N/m"')
     match = _NUMBER_AND_UNIT.fullmatch(text)
     if match is None:
         raise ValueError(f'is "{printable(text)}", which is not a number with a unit')

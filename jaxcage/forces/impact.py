@@ -157,7 +157,7 @@ class RollerPassImpact(AbstractLaw):
     law_name = "impact"
     kind = "roller_pass"
 
-    oscillator: PocketImpact
+    oscillator: PocketImpact = eqx.field(default_factory=PocketImpact)
     harmonics: int = count(1, 128, "harmonics of the roller-pass frequency that are kept", default=48)
 
     def highest_harmonic(self, cage: GuidedCage) -> int:

@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from .._arguments import is_concrete, require_at_least, require_x64
 from .._errors import ArgumentError
+from .._kinematics import land_radius
 from .._parameters import choice, parameter
 from .._pytrees import Scalar, compiled
 from ..bearing import (
@@ -126,7 +127,7 @@ class BearingModel(AbstractForcedSystem):
     def land_radius(self) -> Array:
         """Radius of the cage's guiding surface [m]."""
         if self.guidance == "outer":
-            return jnp.asarray((self.bearing.rib_diameter - self.guidance_gap) / 2)
+            return jnp.asarray(land_radius(self.bearing.rib_diameter, self.guidance_gap))
         return jnp.asarray((self.inner_land_diameter + self.guidance_gap) / 2)
 
     @property

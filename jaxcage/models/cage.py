@@ -12,6 +12,7 @@ from jaxtyping import Array
 
 from .._arguments import is_concrete
 from .._errors import ArgumentError
+from .._kinematics import land_radius
 from .._parameters import parameter, reading, require_readings, with_numbers
 from .._pytrees import Scalar, State
 from ..bearing import Bearing, Lubricant
@@ -227,7 +228,7 @@ class CageModel(AbstractForcedSystem):
     @property
     def land_radius(self) -> Array:
         """Radius of the cage's guiding land R = (d_g - C_r)/2 [m]."""
-        return jnp.asarray((self.bearing.rib_diameter - self.guidance_gap) / 2)
+        return jnp.asarray(land_radius(self.bearing.rib_diameter, self.guidance_gap))
 
     @property
     def harmonics(self) -> int:

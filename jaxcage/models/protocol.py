@@ -16,6 +16,7 @@ import numpy as np
 
 from .._arguments import is_concrete
 from .._errors import ArgumentError, InputError
+from .._kinematics import FASTEST as FASTEST
 from .._pytrees import Scalar, State
 from ..quantities import Quantity
 from .field import AbstractField
@@ -25,9 +26,6 @@ ESCAPE = 2.0
 """Excursion beyond which a trajectory has left the model for good."""
 HIGHEST = 1e9
 """Highest speed of any system [rad/s]."""
-FASTEST = 300.0
-"""Surface speed of the cage at its land [m/s] beyond which no cage runs: rho v^2 alone is 765 MPa of hoop stress in
-brass, twice what it bears, and what is given in rpm for rad/s is 9.5 times as fast as meant."""
 
 
 class StepLimits(NamedTuple):

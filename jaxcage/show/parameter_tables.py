@@ -5,6 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .._catalogue import designated, estimated
 from .._parameters import EXTRA, get, readings_of, walk
 from ..files import configuration, is_range
 from ..models import AbstractForcedSystem
@@ -31,8 +32,8 @@ READINGS = {"clearance_reading": "radial clearance", "unbalance": "unbalance"}
 def sources_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, left: Sequence[str] = ()) -> Table:
     """Table of all parameters of `model` in display units, with their sources.
 
-    **Arguments:** the model; the nested mapping that it was read from, None for a published case; dotted names of
-    values that are still those of the template.
+    **Arguments:** the model; the nested mapping that it was read from, None for a published case; values on lines
+    that are still as `jaxcage init` wrote them, by dotted name.
     """
     rows = []
     for path, field in walk(model):
@@ -44,7 +45,7 @@ def sources_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, 
         name, first = ".".join(path), path[0]
         part = "model" if name == first else first.replace("_", " ")
         if {name, name.removesuffix("_x").removesuffix("_y")} & set(left):
-            source = "the template's, not yours"
+            source = "as `jaxcage init` wrote it"
         elif first == EXTRA:
             source = "a force of your own"
         else:
@@ -83,6 +84,8 @@ def _in_file(path: tuple[str, ...], table: Mapping[str, Any]) -> str:
         return "best guess in a range of this file" if isinstance(here, str) and is_range(here) else "this file"
     for (made, key), words in READY_MADE.items():
         if path[0] == made and isinstance(part, Mapping) and key in part:
+            if key == "designation" and path[-1] in estimated(designated(part[key])):
+                return "estimated for the catalogue"
             return "default" if path[1:] == ("temperature",) else words.format(part[key])
     replaced = isinstance(part, Mapping) and "kind" in part  # by another law than that of the base
     return f"case {table['base']}" if "base" in table and not replaced else "default"

@@ -1,0 +1,188 @@
+"""Input that an engineer has: wrong files refused at once, balance grades, catalogue bearings, short files."""
+
+import json
+import math
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import jaxcage as jc
+from jaxcage.bearing import PUBLISHED_CASES, catalogue, line_contact_stiffness, listed
+from jaxcage.files import ConfigError, configuration, declarations, load_model, model_from, read_bearing, template
+from jaxcage.files.schema import schema
+
+
+SHORT = 40
+"""Most lines of a short file."""
+
+
+def test_the_exported_declarations_are_those_of_the_modules():
+    assert declarations() == json.loads(json.dumps(schema())), "run python -m jaxcage.files.schema"
+
+
+def test_every_base_has_the_first_law_of_each_table():
+    """The first pass takes a law that a file does not choose from there."""
+    models = [*map(jc.case, PUBLISHED_CASES), jc.whole_bearing("nu2310")]
+    for model in models:
+        tables = declarations()["modules"][type(model).__name__]["tables"]
+        assert all(type(getattr(model, name)).__name__ == first for name, (first, *_) in tables.items())
+
+
+WRONG = {
+    "guidence_gap = 1": "Key `guidence_gap` at the top level is unknown (did you mean `guidance_gap`?).",
+    'guidance_gap = "0,25 mm"': 'is "0,25 mm": numbers are written with a point and without commas.',
+    "guidance_gap = 0.25": '1e-05 to 0.005 m, but is 0.25 m; with its unit it is written "0.25 mm".',
+    'guidance_gap = "0.25 kg"': 'has the unit "kg", where a unit like "m" is wanted.',
+    'guidance_gap = "-0.25 mm"': 'to 0.005 m, but is -0.00025 m (given as "-0.25 mm").',
+    "lubricant.temperature = 55": '200 to 600 K, but is 55 K; with its unit it is written "55 degC".',
+    'cage_mass = "3 t"': 'from 0.001 to 100 kg, but is 3000 kg (given as "3 t").',
+    'eccentricity = "G6.3"': 'speed of its balance grade, such as "G6.3 at 12000 rpm shaft", but is "G6.3".',
+    'eccentricity = "G6.3 at 200 Hz shaft"': 'such as "G6.3 at 12000 rpm shaft", but is in Hz',
+    'guidance = "inner"': 'Key `guidance` at the top level needs model = "bearing".',
+    'bearing.designation = "6204"': "`bearing.designation` must be one of NU1010, NU1014,",
+}
+REFUSALS = """
+import sys, time
+from jaxcage.cli import main
+for path in sys.argv[1:]:
+    print(main(["statics", path]), file=sys.stderr)
+print(sorted({"jax", "equinox"} & set(sys.modules)), file=sys.stderr)
+"""
+
+
+def test_wrong_files_are_refused_before_jax_is_loaded(tmp_path: Path):
+    paths = [tmp_path / f"{i}.toml" for i in range(len(WRONG))]
+    for path, line in zip(paths, WRONG, strict=True):
+        path.write_text(f'base = "1a"\n{line}\n')
+    command = [sys.executable, "-c", REFUSALS, *map(str, paths), str(tmp_path / "none.toml"), "1c"]
+    found = subprocess.run(command, capture_output=True, text=True, check=True).stderr.splitlines()
+    assert found[-1] == "[]" and found[1:-1:2] == ["2"] * (len(WRONG) + 2)
+    for said, ends in zip(found[::2], WRONG.values(), strict=False):
+        assert ends in said and said.startswith("File '")
+    assert "none.toml' must be a readable TOML file, but: No such file or directory." in found[-5]
+    assert found[-3].startswith("Case '1c' is unknown: it must be one of 1a,")
+
+
+@pytest.mark.parametrize(
+    "case, option, rpm",
+    [
+        ("1a", '--speed "70000 rpm cage"', "62516"),  # 300 m/s/(91.65 mm/2)
+        ("nu2310", '--speed "160000 rpm shaft"', "62516"),  # whose cage turns at 65/162 of that
+        ("mine.toml", "--first 3000 --last 140000", "60153"),  # NU 1014: 300 m/s/(95.25 mm/2), of the shaft
+    ],
+)
+def test_a_speed_at_which_no_cage_runs_is_refused_before_jax_is_loaded(
+    tmp_path: Path, case: str, option: str, rpm: str
+):
+    text = template(short=True).replace("NU2310", "NU1014")
+    (tmp_path / "mine.toml").write_text(text)
+    command = shlex.split(f"{'sweep' if 'last' in option else 'poincare'} {case} {option}")
+    code = "import sys; from jaxcage.cli import main; main(sys.argv[1:]); print('jax' in sys.modules)"
+    ran = subprocess.run(
+        [sys.executable, "-c", code, *command], capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    assert ran.stdout == "False\n" and f"leave the cage at most {rpm} rpm, which is 300 m/s at its land" in ran.stderr
+
+
+def test_init_loads_no_jax(tmp_path: Path):
+    code = 'import sys; from jaxcage.cli import main; main(["init", sys.argv[1]]); print("jax" in sys.modules)'
+    command = [sys.executable, "-c", code, str(tmp_path / "mine.toml")]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.endswith("False\n")
+
+
+def test_eccentricity_by_a_balance_grade():
+    """e = G/omega: 6.3 mm/s at 12000 rpm are 5.013 um; the cage of an NU 1014 turns at 80/180 of the shaft's speed."""
+    read = lambda text, **more: model_from(
+        {"base": "1a", "eccentricity": text, "bearing": {"designation": "NU1014"}} | more
+    )
+    of_cage = 6.3e-3 / (12000 * math.pi / 30)
+    assert of_cage == pytest.approx(5.013e-6, rel=1e-4)
+    for text, expected in (
+        ("G6.3 at 12000 rpm cage", of_cage),
+        ("G 6.3 at 12000 rpm shaft", of_cage * 180 / 80),
+        ("g2.5 at 1256.637 rad/s shaft", 2.5 / 6.3 * of_cage * 180 / 80),
+    ):
+        assert float(read(text).eccentricity) == pytest.approx(expected, rel=1e-6)
+    assert float(read("G6.3 at 12000 rpm").eccentricity) == pytest.approx(of_cage)
+    assert float(read("G6.3 at 12000 rpm", speeds="shaft").eccentricity) == pytest.approx(of_cage * 180 / 80)
+    whole = model_from({"base": "nu2310", "eccentricity": "G6.3 at 12000 rpm"})
+    assert float(whole.eccentricity) == pytest.approx(of_cage * 162 / 65)
+    with pytest.raises(ConfigError, match=r"`eccentricity` must be a number .* but is 0.0501"):
+        read("G6300 at 1200 rpm cage")
+
+
+# Bearings of the catalogue.
+
+
+def test_what_is_estimated_of_a_catalogue_bearing_is_named(tmp_path: Path):
+    path = tmp_path / "mine.toml"
+    path.write_text('base = "1a"\n[bearing]\ndesignation = "NU1020"\npocket_clearance = "0.2 mm"')
+    rollers = "n_rollers", "roller_diameter", "roller_length"
+    names = "radial_clearance", "effective_length", *rollers
+    file = read_bearing(path)
+    assert file.estimated == tuple(f"bearing.{name}" for name in names)
+    rows = jc.show.sources_table(file.model, file.table, file.left).records
+    found = {row["name"].removeprefix("bearing."): row["from"] for row in rows if row["name"].startswith("bearing.")}
+    assert {name for name, source in found.items() if source == "estimated for the catalogue"} == {*names}
+    assert (found["bore"], found["pocket_clearance"]) == ("catalogue, NU1020", "this file")
+    path.write_text('base = "1a"\n[bearing]\ndesignation = "NU2310"')
+    assert read_bearing(path).estimated == ()
+
+
+@pytest.mark.parametrize("name", ["NU1014", "NU2210"])
+def test_rollers_weigh_by_their_length_and_carry_by_their_effective_length(name: str):
+    b = listed(name).bearing
+    l, effective = float(b.roller_length), float(b.effective_length)
+    assert l - effective == pytest.approx(1.5e-3)
+    assert float(b.raceway_stiffness) == pytest.approx(float(line_contact_stiffness(b.palmgren_constant, effective)))
+    assert float(b.roller_mass) == pytest.approx(7800 * math.pi / 4 * float(b.roller_diameter) ** 2 * l)
+
+
+def test_the_effective_length_of_a_file(tmp_path: Path):
+    """Palmgren: K goes as the length to 8/9. Left out, it is the roller's, whatever that is changed to."""
+    plain, shorter = (model_from({"base": "nu2310", "bearing": b}) for b in ({}, {"effective_length": "25.5 mm"}))
+    ratio = float(shorter.bearing.raceway_stiffness / plain.bearing.raceway_stiffness)
+    assert ratio == pytest.approx((25.5 / 27) ** (8 / 9))
+    assert "effective_length" not in jc.parameters(plain)
+    assert float(jc.parameters(shorter)["effective_length"]) == pytest.approx(25.5e-3)
+    assert configuration(load_model(jc.files.save_model(tmp_path / "m.toml", shorter))) == configuration(shorter)
+    longer = jc.replace(plain, roller_length=30e-3).bearing
+    assert float(longer.raceway_stiffness / plain.bearing.raceway_stiffness) == pytest.approx((30 / 27) ** (8 / 9))
+    with pytest.raises(ConfigError, match="`bearing.effective_length` must be at most `roller_length`, 27 mm"):
+        model_from({"base": "nu2310", "bearing": {"effective_length": "28 mm"}})
+
+
+def test_every_bearing_of_the_catalogue_makes_a_whole_bearing():
+    for name in catalogue():
+        b = listed(name).bearing
+        inertia, land = 0.06 * float(b.pitch_diameter) ** 2 / 4, 0.8 * float(b.land_width_limit)
+        table = {"base": "nu2310", "bearing": {"designation": name}, "cage_mass": "60 g", "cage_inertia": inertia}
+        model = model_from(table | {"film": {"land_width": land}})
+        assert float(model.bearing.bore) == float(b.bore)
+
+
+# Short files.
+
+
+@pytest.mark.parametrize("subject", ["cage", "bearing"])
+def test_a_short_file_says_the_same_as_the_long_one(subject):
+    text = template(subject, short=True)
+    assert len(text.splitlines()) <= SHORT and max(map(len, text.splitlines())) <= 125
+    short, full = (jc.parameters(model_from(tomllib.loads(template(subject, s)))) for s in (True, False))
+    assert {n: float(x) for n, x in short.items()} == pytest.approx({n: float(x) for n, x in full.items()}, rel=0.03)
+
+
+def test_a_value_is_the_users_once_its_line_is_edited(tmp_path: Path):
+    path = tmp_path / "mine.toml"
+    path.write_text(template(short=True))
+    assert {"cage_mass", "guidance_gap", "lubricant.grade"} <= set(read_bearing(path).left)
+    lines = template(short=True).splitlines()
+    edited = [line.partition("#")[0] if line.startswith(("cage_mass", "grade")) else line for line in lines]
+    edited = [line.replace("0.45 mm +- 0.05", "0.25 mm +- 0.05") for line in edited]
+    path.write_text("\n".join(edited))
+    left = set(read_bearing(path).left)
+    assert not {"cage_mass", "guidance_gap", "lubricant.grade"} & left and "eccentricity" in left
