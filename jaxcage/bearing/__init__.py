@@ -31,6 +31,7 @@ from .geometry import (
 from .line_contact import (
     PALMGREN_CONSTANT as PALMGREN_CONSTANT,
     line_contact_approach as line_contact_approach,
+    line_contact_load as line_contact_load,
     line_contact_stiffness as line_contact_stiffness,
     raceway_loads_of_all as raceway_loads_of_all,
 )

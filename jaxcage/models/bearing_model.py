@@ -19,6 +19,7 @@ from ..bearing import (
     Lubricant,
     brass,
     line_contact_approach,
+    line_contact_load,
     load_distribution,
     nu2310,
     raceway_loads_of_all,
@@ -359,6 +360,7 @@ def state_scale(model: BearingModel, speed: Scalar) -> BearingState:
     # A bearing at rest and without load too has a depth of contact and a speed in whose units errors can be stated.
     least = stiff * (LEAST_DEPTH * bearing.roller_diameter) ** (10 / 9)
     force = 4 * model.load / n + bearing.roller_mass * (pitch * model.rolling_cage_speed(speed) ** 2 + model.gravity)
+    force = force + line_contact_load(stiff, -bearing.radial_clearance / 4)
     depth = line_contact_approach(stiff, force + least)
     fast = jnp.sqrt((force + least) / (depth * bearing.roller_mass))
     omega = jnp.hypot(model.rolling_cage_speed(speed), LEAST_SPEED * fast)
