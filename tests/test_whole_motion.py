@@ -68,7 +68,8 @@ def test_energy(run):
 
 
 KINDS = {
-    "inner": {"guidance": "inner", "eccentricity": 2e-4, "drag_coefficient": 1.0, "churning_coefficient": 0.5},
+    "inner": {"guidance": "inner", "eccentricity": 2e-4, "drag_coefficient": 1.0, "churning_coefficient": 0.5}
+    | {"drag.rolling_law": "bath", "drag.drag_law": "cylinder"},
     "outer ring turns": {"outer_speed": -300.0, "pockets.pocket_law": "power", "rest": 0.005},
     "held": {"cage_rotation": "held", "film.model": "full", "supply_pressure": 0.0},
 }

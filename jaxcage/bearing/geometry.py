@@ -16,8 +16,8 @@ from .line_contact import PALMGREN_CONSTANT, line_contact_stiffness
 
 
 MOST_PRELOAD = -50e-6
-"""Smallest radial clearance [m]. It presses rollers of 7 to 20 mm on both raceways with 1.5 to 2.5 GPa, the fatigue limit
-of ISO 281 and more: no bearing lives with a larger preload."""
+"""Smallest radial clearance [m]. It presses rollers of 7 to 20 mm on both raceways with 1.5 to 2.5 GPa: 1.5 GPa is the
+fatigue limit of ISO 281."""
 
 
 class Material(eqx.Module):
