@@ -68,9 +68,8 @@ class Forces(NamedTuple):
     drag_across: Many
     churning: Many
     drag_power: Many
-    rolling_outer: Many | None = None
-    """Couples of rolling resistance on the roller, where they are considered [N m]."""
-    rolling_inner: Many | None = None
+    rolling: tuple[Many, Many] | None = None
+    """Couples of rolling resistance of outer and inner ring on the roller, where they are considered [N m]."""
     land: LandForces | None = None
 
 
@@ -195,7 +194,7 @@ class BearingAtSpeed(AbstractField):
         by_outer = rolling_resistance(self.outer_race, outer.load, rollers.spin)
         by_inner = rolling_resistance(self.inner_race, inner.load, rollers.spin)
         power = power - by_outer * (rollers.spin - self.outer_race.speed) - by_inner * (rollers.spin - self.speed)
-        return found._replace(drag_power=power, rolling_outer=by_outer, rolling_inner=by_inner)
+        return found._replace(drag_power=power, rolling=(by_outer, by_inner))
 
     def on_land(self, cage: Bodies) -> LandForces:
         """The guiding land."""
@@ -244,9 +243,9 @@ class BearingAtSpeed(AbstractField):
         across = across - self.roller_mass * self.model.gravity * g.cos
         on_rings = inner.traction * inner.race_arm, outer.traction * outer.race_arm
         moment = outer.arm * outer.traction - inner.arm * inner.traction + pocket.roller_moment + f.churning
-        if f.rolling_outer is not None:
-            moment = moment + f.rolling_outer + f.rolling_inner
-            on_rings = on_rings[0] + f.rolling_inner, on_rings[1] + f.rolling_outer
+        if f.rolling is not None:
+            by_outer, by_inner = f.rolling
+            moment, on_rings = moment + by_outer + by_inner, (on_rings[0] + by_inner, on_rings[1] + by_outer)
         per_mass = 1 / self.roller_mass
         rates = (
             rollers.orbit - cage.cage_speed,
