@@ -177,6 +177,7 @@ def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float, slip: float 
     if skids and not below:
         notes.append(f"The model disagrees with the makers' rules: {given}, although the load is above all of them")
     if not skids and len(below) == len(rules):
-        said = "although the load is below all of them; more oil between the rings would make it slip more"
+        why = "they hold without preload" if bearing.radial_clearance < 0 else "more oil would make it slip more"
+        said = f"although the load is below all of them; {why}"
         notes.append(f"The model disagrees with the makers' rules: {given}, {said}")
     return notes
