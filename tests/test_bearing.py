@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from helpers import unit_exponents
 from literature import loads_by_scipy
+from scipy.optimize import brentq
 
+import jaxcage as jc
 import jaxcage.bearing as jb
 from jaxcage import parameter_info, parameters, replace
 
@@ -47,6 +49,45 @@ def test_discrete_rollers(clearance):
     assert float(result.max_load) == pytest.approx(loads[0], rel=1e-6)
     assert float(result.elastic_approach) == pytest.approx(shift - clearance / 2, rel=1e-6)
     assert float(result.half_angle) == pytest.approx(np.arccos(clearance / 2 / shift), rel=1e-6)
+
+
+@pytest.mark.parametrize("clearance", [-10e-6, -50e-6])
+def test_a_ring_pressed_evenly(clearance):
+    """Without load each roller bears K (-G_r/4)^(10/9) on both raceways, as each takes half of -G_r/2 of approach."""
+    bearing, found = distribution(clearance, load=1e-3)
+    each = 8.06e10 * 0.027 ** (8 / 9) * (-clearance / 4) ** (10 / 9)
+    np.testing.assert_allclose(found.inner_loads, each, rtol=1e-6)
+    np.testing.assert_allclose(found.outer_loads, each, rtol=1e-6)
+    assert found.half_angle == pytest.approx(np.pi) and abs(float(found.shaft_shift)) < 1e-11
+    modulus = 210e9 / (1 - 0.3**2) / 2
+    pressure = np.sqrt(each * modulus * (1 / 8e-3 + 1 / 32.5e-3) / (np.pi * 27e-3))
+    assert (pressure < 1.5e9) == (clearance > -50e-6)  # the fatigue limit of ISO 281
+
+
+@pytest.mark.parametrize("load", [300.0, 20e3, 400e3])
+@pytest.mark.parametrize("centrifugal", [0.0, 300.0])
+def test_a_preloaded_bearing_under_load(load, centrifugal):
+    """Against SciPy; under the largest load the rollers opposite to it come free."""
+    bearing, found = distribution(-20e-6, load, centrifugal)
+    k, cos = float(bearing.raceway_stiffness), np.cos(2 * np.pi / 13 * np.arange(13))
+
+    def on_inner(approach):
+        outer = lambda q: (q / k) ** 0.9 + ((q + centrifugal) / k) ** 0.9 - approach
+        return brentq(outer, 0.0, 1e7, xtol=1e-9, rtol=1e-14) if outer(0.0) < 0 else 0.0
+
+    loads = lambda shift: np.array([on_inner(shift * c + 10e-6) for c in cos])
+    shift = brentq(lambda d: loads(d) @ cos - load, 0.0, 1e-3, xtol=1e-16, rtol=1e-14)
+    assert float(found.shaft_shift) == pytest.approx(shift, rel=1e-8)
+    np.testing.assert_allclose(found.inner_loads, loads(shift), atol=1e-8 * load)
+    assert (found.half_angle < np.pi) == (np.min(found.inner_loads) == 0)
+
+
+def test_a_cage_model_takes_no_preload():
+    with pytest.raises(ValueError, match="radial_clearance` must be at least 0 for a cage model.*is -10 um"):
+        jc.replace(jc.case("1a"), radial_clearance=-10e-6)
+    assert float(jc.replace(jc.whole_bearing("nu2310"), radial_clearance=-50e-6).bearing.radial_clearance) == -50e-6
+    with pytest.raises(ValueError, match="from -5e-05 to 0.001 m, but is -6e-05 m"):
+        jc.replace(jc.whole_bearing("nu2310"), radial_clearance=-60e-6)
 
 
 def series_stiffness(bearing):

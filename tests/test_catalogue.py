@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from jaxcage.bearing import catalogue, listed, listed_like, nu2310, static_load_rating
+from jaxcage.show import minimum_load_notes
 
 
 @pytest.mark.parametrize("name", catalogue())
@@ -42,6 +43,15 @@ def test_minimum_load_by_hand():
     found = listed("NU2310")
     np.testing.assert_allclose(found.minimum_loads(6700.0), (1600.0, 2432.0))
     np.testing.assert_allclose(found.minimum_loads(13400.0)[0] / 1600.0, 1.4)
+
+
+def test_makers_rules_beside_a_computed_slip():
+    """1.6 and 2.4 kN of SKF and C0/60 = 3.1 kN at 6700 rpm: a sentence where slip is small below or large above all."""
+    notes = lambda load, slip: minimum_load_notes(nu2310(), load, 6700.0, slip)
+    assert "below C0/60 of NU2310 and SKF's rule, usual cage" in notes(1000.0, 0.5)[0]
+    assert len(notes(1000.0, 0.5)) == len(notes(2000.0, 0.01)) == len(notes(4450.0, 0.01)) == 1
+    assert "slip of the cage is 1.00%, although the load is below all" in notes(1000.0, 0.01)[1]
+    assert "slip of the cage is 5.00%, although the load is above all" in notes(4450.0, 0.05)[1]
 
 
 def test_an_unknown_designation_is_refused():

@@ -48,7 +48,7 @@ REFUSED = [
     ("poincare 1a", "--speed"),
     ("statics 1a --load -4450", "--load must be above 0 N"),
     ("statics 1a --load heavy", '"heavy"'),
-    ("statics 1a --shaft-speed 1e6 --load 1e-6", "--load and --shaft-speed"),
+    ("statics 1a --speed 6e4 --load 1e-10", "--load and --speed"),
     ("runup 1a --rate 1e6", "--rate"),
     ("map 1a --y gap", "--y must be one of"),
     ("map 1a --lower 0.4kg", "--lower"),

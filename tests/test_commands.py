@@ -46,7 +46,20 @@ def test_poincare(capsys: pytest.CaptureFixture[str], tmp_path: Path):
 
 
 def test_simulate(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    found = document(capsys, "simulate", "1a", "--speed", "15000", "--revolutions", "3", *RK4, "--out", str(tmp_path))
+    found = document(
+        capsys,
+        "simulate",
+        "1a",
+        "--speed",
+        "15000",
+        "--revolutions",
+        "3",
+        "--discard",
+        "0",
+        *RK4,
+        "--out",
+        str(tmp_path),
+    )
     assert found["outcome"] == "successful" and found["measures"]["drag_power"] > 0 and is_png(found["figure"])
     columns, mass = read_columns(found["data"]), float(jc.case("1a").cage_mass)
     assert columns["time [s]"].size == 3 * 128
@@ -76,6 +89,7 @@ def test_statics(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     assert found["cage_displacement"] == pytest.approx(
         {"outer_rib": 0.225e-3, "inner_rib": shift + 0.225e-3, "roller": shift + 0.3e-3}
     )
+    assert found["kinematic_viscosity"] == pytest.approx(56e-6, rel=1e-9)
     assert found["kinematics"]["cage_speed_ratio"] == pytest.approx(RATIO, rel=1e-9)
     assert read_columns(found["data"])["inner load [N]"].max() == pytest.approx(found["max_load"])
     assert is_png(found["figure"])
@@ -83,8 +97,8 @@ def test_statics(capsys: pytest.CaptureFixture[str], tmp_path: Path):
 
 def test_a_speed_may_be_the_shafts_or_the_cages(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     found = lambda *given: document(capsys, *given, "--out", str(tmp_path))
-    cage = found("statics", "1a", "--shaft-speed", "10000 rpm cage")
-    shaft = found("statics", "1a", "--shaft-speed", f"{10000 / RATIO!r} rpm shaft")
+    cage = found("statics", "1a", "--speed", "10000 rpm cage")
+    shaft = found("statics", "1a", "--speed", f"{10000 / RATIO!r} rpm shaft")
     assert cage["rollers"] == shaft["rollers"] and cage["kinematics"] == shaft["kinematics"]
     assert cage["kinematics"]["cage_speed"] == pytest.approx(10000 * math.pi / 30)
     run = lambda *given: found("simulate", *given, "--revolutions", "1", *RK4)

@@ -108,8 +108,8 @@ def test_options_take_units(command: str):
 def test_speeds_loads_and_durations_take_units():
     read = lambda *arguments: _parse(list(arguments)).keywords
     assert read("poincare", "1a", "--speed", "8500 rpm")["speed"] == pytest.approx(8500.0, rel=1e-12)
-    statics = read("statics", "1a", "--load", "4.45 kN", "--shaft-speed", "100 rad/s")
-    assert (statics["load"], statics["shaft_speed"]) == pytest.approx((4450.0, 3000 / math.pi), rel=1e-12)
+    statics = read("statics", "1a", "--load", "4.45 kN", "--speed", "100 rad/s")
+    assert (statics["load"], statics["speed"]) == pytest.approx((4450.0, 3000 / math.pi), rel=1e-12)
     assert read("statics", "1a")["load"] is None
 
 

@@ -28,7 +28,7 @@ def mine(tmp_path: pathlib.Path) -> str:
 
 def test_simulate(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path, mine: str):
     """A file's bearing at a load of the command line."""
-    asked = ["simulate", mine, "--speed", "10000 rpm", "--load", "4.45 kN", "--revolutions", "1"]
+    asked = ["simulate", mine, "--speed", "10000 rpm", "--load", "4.45 kN", "--revolutions", "1", "--discard", "0"]
     found = document(capsys, *asked, "--out", str(tmp_path))
     assert found["outcome"] == "successful" and found["shaft_speed_rpm"] == 10000 and found["load_N"] == 4450
     measures = found["measures"]

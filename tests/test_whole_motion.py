@@ -68,7 +68,8 @@ def test_energy(run):
 
 
 KINDS = {
-    "inner": {"guidance": "inner", "eccentricity": 2e-4, "drag_coefficient": 1.0, "churning_coefficient": 0.5},
+    "inner": {"guidance": "inner", "eccentricity": 2e-4, "drag_coefficient": 1.0, "churning_coefficient": 0.5}
+    | {"drag.rolling_law": "bath", "drag.drag_law": "cylinder"},
     "outer ring turns": {"outer_speed": -300.0, "pockets.pocket_law": "power", "rest": 0.005},
     "held": {"cage_rotation": "held", "film.model": "full", "supply_pressure": 0.0},
 }
@@ -320,6 +321,21 @@ def test_a_revolution_of_a_stiff_bearing():
 
 
 @pytest.mark.slow
+def test_preload_prevents_skidding():
+    """In the oil's drag rollers skid at 300 N and a clearance of 40 um; with preload all roll, even without load."""
+    oil = {"drag.drag_law": "cylinder", "drag.rolling_law": "bath", "drag_coefficient": 1.0, "oil_share": 0.015}
+    slips, loads = {}, {}
+    for clearance, load in ((40e-6, 300.0), (-10e-6, 0.0)):
+        model = jc.replace(jc.whole_bearing("nu2310"), load=load, radial_clearance=clearance, **oil)
+        ran = jc.simulate(model, jc.rpm(6700), revolutions=10, discard=20, samples=32)
+        assert ran.outcome == "successful"
+        slips[clearance] = jc.measures(model, ran).value("cage_slip")
+        loads[clearance] = model.roller_history(ran).inner_load.min()
+    assert slips[40e-6] > 0.2 and abs(slips[-10e-6]) < 2e-3
+    assert loads[40e-6] == 0 and loads[-10e-6] > 100
+
+
+@pytest.mark.slow
 def test_a_lightly_loaded_bearing_skids():
     """At 100 N the slip passes 5 %; at 4450 N it stays below 2 %."""
     slips = {}
@@ -335,7 +351,19 @@ def test_simulate_prints_slips_forces_and_losses(capsys: pytest.CaptureFixture[s
     """Of a file, at a load of the command line; figure and data beside it."""
     path = tmp_path / "mine.toml"
     path.write_text('base = "nu2310"\nload = "300 N"')
-    asked = ["simulate", str(path), "--speed", "10000 rpm", "--load", "4.45 kN", "--revolutions", "1", "--json"]
+    asked = [
+        "simulate",
+        str(path),
+        "--speed",
+        "10000 rpm",
+        "--load",
+        "4.45 kN",
+        "--revolutions",
+        "1",
+        "--discard",
+        "0",
+        "--json",
+    ]
     assert main([*asked, "--out", str(tmp_path)]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["outcome"] == "successful" and found["shaft_speed_rpm"] == 10000 and found["load_N"] == 4450
@@ -350,7 +378,7 @@ def test_simulate_prints_slips_forces_and_losses(capsys: pytest.CaptureFixture[s
 
 def test_speed_of_the_cage(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     cage = float(jc.whole_bearing("nu2310").rolling_cage_speed(1e4))
-    asked = ["simulate", "nu2310", "--speed", f"{cage!r} rpm cage", "--revolutions", "1", "--json"]
+    asked = ["simulate", "nu2310", "--speed", f"{cage!r} rpm cage", "--revolutions", "1", "--discard", "0", "--json"]
     assert main([*asked, "--out", str(tmp_path)]) == 0
     assert json.loads(capsys.readouterr().out)["shaft_speed_rpm"] == pytest.approx(1e4, rel=1e-12)
 

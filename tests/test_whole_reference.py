@@ -20,6 +20,8 @@ RICH = {
     "drag_coefficient": 1.2,
     "churning_coefficient": 0.6,
     "rest": 0.005,
+    "drag.drag_law": "cylinder",
+    "drag.rolling_law": "bath",
     "outer_speed": 40.0,
     "eccentricity": 1e-4,
 }

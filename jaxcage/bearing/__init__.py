@@ -5,6 +5,7 @@
 | `geometry` | the `Bearing`: dimensions, masses, raceway and cage speeds, the design rule T > C_r > G_r |
 | `line_contact` | load and approach of a roller between two raceways: (3), (4), (10) |
 | `oil` | viscosity of the oil at its temperature (ASTM D341), oils by grade |
+| `oil_drag` | drag of the oil on rollers, rolling resistance |
 | `statics` | load distribution, loaded zone, static cage displacement: (1), (2), (5), (6) |
 | `catalogue` | bearings by designation with ratings and minimum loads; the published cases and figure axes |
 """
@@ -31,10 +32,19 @@ from .geometry import (
 from .line_contact import (
     PALMGREN_CONSTANT as PALMGREN_CONSTANT,
     line_contact_approach as line_contact_approach,
+    line_contact_load as line_contact_load,
     line_contact_stiffness as line_contact_stiffness,
     raceway_loads_of_all as raceway_loads_of_all,
 )
 from .oil import Lubricant as Lubricant, vg as vg
+from .oil_drag import (
+    LOAD_POWER as LOAD_POWER,
+    STARVATION as STARVATION,
+    cylinder_drag_coefficient as cylinder_drag_coefficient,
+    rolling_couple as rolling_couple,
+    rolling_factors as rolling_factors,
+    rolling_moment as rolling_moment,
+)
 from .statics import (
     LoadDistribution as LoadDistribution,
     load_distribution as load_distribution,

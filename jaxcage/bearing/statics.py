@@ -12,7 +12,7 @@ from .._arguments import is_concrete, require_x64
 from .._errors import ArgumentError
 from .._pytrees import Scalar
 from .geometry import Bearing
-from .line_contact import line_contact_approach, raceway_loads_of_all
+from .line_contact import line_contact_approach, line_contact_load, raceway_loads_of_all
 
 
 LARGEST = 1e12
@@ -44,7 +44,8 @@ class LoadDistribution(eqx.Module):
 
     acos(G_r/(2 delta_s)), the clean form of (2): the paper prints this as the whole angle and with delta_r, the elastic
     approach, in place of the shift of the shaft delta_s = delta_r + G_r/2. To G_r is added twice the approach of the
-    rollers to the outer raceway that their centrifugal force makes, as it shrinks the zone.
+    rollers to the outer raceway that their centrifugal force makes, as it shrinks the zone. It is pi where a preload
+    keeps all rollers loaded.
     """
 
 
@@ -61,28 +62,36 @@ def static_cage_displacements(bearing: Bearing, guidance_gap: Scalar, elastic_ap
     return {"outer_rib": at_rest, "inner_rib": shift + at_rest, "roller": shift + bearing.pocket_clearance}
 
 
+def _half_angle(play: Array, shift: Array) -> Array:
+    """acos(play/shift), and pi where a preload keeps all rollers loaded."""
+    around = play + jnp.abs(shift) <= 0
+    return jnp.where(around, jnp.pi, jnp.arccos(play / jnp.where(around, jnp.inf, shift)))
+
+
 @eqx.filter_jit
 def _distribution(bearing: Bearing, load: Array, centrifugal: Array, first_angle: Array) -> LoadDistribution:
     """The distribution, of which shift and half angle are NaN where the loads make no sense.
 
     The unknown is the excess of the nearest roller: its approach beyond the `seat` into which its centrifugal force
     presses it. The forces rise steadily but have kinks: the root is found by bisection and differentiated implicitly.
-    At zero excess no roller is loaded and at the bound that one alone carries the load, so that the root is enclosed.
+    At zero excess no roller carries upwards and at the bound that one carries more than the load, so that the root is
+    enclosed. Under preload that excess is larger by the distance over which the opposite rollers come free, twice over.
     """
     angles = first_angle + 2 * jnp.pi / bearing.n_rollers * jnp.arange(bearing.n_rollers, dtype=float)
     stiffness, cosines = bearing.raceway_stiffness, -jnp.sin(angles)
     nearest = jnp.max(cosines)
     approach = partial(line_contact_approach, stiffness)
     seat = approach(centrifugal)
-    bound = 1.01 * (approach(load / nearest) + approach(load / nearest + centrifugal) - seat)
     play = bearing.radial_clearance / 2 + seat
+    bound = 1.01 * (approach(load / nearest) + approach(load / nearest + centrifugal) - seat)
+    bound, squeeze = bound + 2 * jnp.maximum(-play, 0.0), bearing.n_rollers * line_contact_load(stiffness, -play)
 
     def loads(excess: Array) -> tuple[Array, Array]:
         ratio = cosines / nearest  # delta_s cos(psi) - G_r/2 without cancellation at the nearest roller
         return raceway_loads_of_all(seat + excess * ratio - play * (1 - ratio), stiffness, centrifugal)
 
     def imbalance(fraction: Array, _: None) -> Array:
-        return jnp.sum(loads(fraction * bound)[0] * cosines) / load - 1
+        return (jnp.sum(loads(fraction * bound)[0] * cosines) - load) / (load + squeeze)
 
     # Without `throw`, which would put a callback to Python into every program and keep it from being cached on disk.
     solver, options = optx.Bisection(rtol=1e-12, atol=1e-11, flip=False), dict(lower=0.0, upper=1.0)
@@ -98,7 +107,7 @@ def _distribution(bearing: Bearing, load: Array, centrifugal: Array, first_angle
         max_load=jnp.max(inner),
         shaft_shift=shift,
         elastic_approach=seat + excess,
-        half_angle=jnp.arccos(play / shift),
+        half_angle=_half_angle(play, shift),
     )
 
 

@@ -53,20 +53,18 @@ def statics(
     subject: o.Case,
     *,
     load: Annotated[float | None, o.number("be above 0 N", lambda x: x > 0, "N")] = None,
-    shaft_speed: Annotated[float, o.number("be at least 0 rpm", lambda x: x >= 0, "rpm")] = 0.0,
+    speed: o.SpeedOrRest = None,
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
     """Load of every roller, loaded zone, static displacement of the cage, kinematics.
 
     Args:
         load: Shaft load [N], or with a unit, e.g. "4.45 kN"; the case's own if left out.
-        shaft_speed: Speed of the shaft [rpm], or with a unit or of the cage, e.g. "10000 rpm cage".
     """
     model, bearing, force = subject.model, subject.model.bearing, float(subject.model.load) if load is None else load
     if force <= 0:
         raise InputError(f"The load of {subject.name} must be above 0 N, but it is {force:g}: give one with --load.")
-    ratio = float(bearing.cage_speed_ratio) if getattr(shaft_speed, "whose", "shaft") == "cage" else 1.0
-    shaft = float(shaft_speed) / ratio / RPM
+    shaft = 0.0 if speed is None else float(subject.both(subject.speed(speed))["shaft_speed_rpm"]) / RPM
     found = jc.bearing.load_distribution(bearing, force, bearing.roller_centrifugal_force(shaft))
     title, loads = f"{subject.name} at {force:g} N, shaft at {shaft * RPM:g} rpm", np.asarray(found.inner_loads)
     heads = {"angle": "rad", "inner load": "N", "outer load": "N"}
@@ -83,14 +81,15 @@ def statics(
     document: dict[str, Any] = {
         n: float(getattr(found, n)) for n in ("max_load", "shaft_shift", "elastic_approach", "half_angle")
     }
-    document |= {"load": force, "shaft_speed_rpm": shaft * RPM}
+    viscosity = float(model.lubricant.kinematic_viscosity)
+    document |= {"load": force, "shaft_speed_rpm": shaft * RPM, "kinematic_viscosity": viscosity}
     document["cage_displacement"] = jc.show.displacements(model, found)
     kinematics = {name: float(getattr(bearing, name)(shaft)) for name in ("cage_speed", "roller_centrifugal_force")}
     document["kinematics"] = {"cage_speed_ratio": float(bearing.cage_speed_ratio), **kinematics}
     said = f"{np.sum(loads > 0)} of {loads.size} rollers carry {force:g} N, the most loaded one {np.max(loads):.0f} N."
     figure = jc.show.drawn(partial(jc.show.load_bars, found), 7.0, 3.8, title)
     files = {"figure": figure, "data": {f"{name} [{heads[name]}]": x for name, x in data.items()}}
-    return Answer(said, tables, [], document, files)
+    return Answer(said, tables, jc.show.minimum_load_notes(bearing, force, shaft * RPM), document, files)
 
 
 def report(

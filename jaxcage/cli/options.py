@@ -112,6 +112,7 @@ else:  # a text, which the wrapper replaces by the subject before it runs the co
     Case = Annotated[tyro.conf.Positional[Any], text(metavar="CASE"), arg(help=_CASE)]
     Other = Annotated[tyro.conf.Positional[Any], text(metavar="OTHER"), arg(help="The design to compare it with.")]
 Speed = Annotated[float, _SPEED, arg(help=f'Speed, e.g. "900 rad/s" or "20000 rpm shaft". {_OWN}.')]
+SpeedOrRest = Annotated[float | None, _SPEED, arg(help=f"Speed; at rest if left out. {_OWN}.")]
 Load = Annotated[float | None, _LOAD, arg(help='Shaft load of a bearing with its rollers [N], e.g. "4.45 kN".')]
 Draws = Annotated[int, count(0), arg(help="Draws from ranges of the file; 0 takes the best guesses.")]
 Seed = Annotated[int, count(0), arg(help="Seed of all that is drawn.")]

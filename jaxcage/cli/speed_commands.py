@@ -43,10 +43,15 @@ def simulate(
     run: o.RunOptions = o.RunOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Time history and forces at one speed, of 20 revolutions if left out; slips of a bearing with its rollers."""
+    """Time history and forces at one speed; slips of a bearing with its rollers.
+
+    Of 20 revolutions if --revolutions is left out. The start-up before them is left out: 50 revolutions of a cage, 20
+    of a bearing with its rollers, or as many as --discard says.
+    """
     model, at, method = subject.model, subject.speed(speed), run.method
     steps = getattr(method, "steps", 128)  # of equal steps the samples must divide the number
-    length: dict[str, Any] = {"revolutions": run.revolutions or 20, "discard": run.discard or 0}
+    started = subject.usual(50, 20) if run.discard is None else run.discard
+    length: dict[str, Any] = {"revolutions": run.revolutions or 20, "discard": started}
     samples = max(n for n in range(1, min(128, steps) + 1) if steps % n == 0)
     found = jc.simulate(model, at, **length, samples=samples, method=method)
     where = subject.at(at)
@@ -55,17 +60,22 @@ def simulate(
     title, measures = f"{subject.name}, {where}", jc.measures(model, found)
     document = subject.both(at) | length | {"outcome": found.outcome, "error": found.error}
     document["measures"] = {name: each.value for name, each in measures.items()}
+    notes = [f"Error of a revolution: at most {found.error:.0e} of the scale ({found.outcome})"]
     if (rollers := jc.show.rollers_of(model, found)) is None:
         columns = jc.show.trajectory_columns(found, jc.analysis.cage_forces(model, found))
     else:
         shares = jc.analysis.pocket_force_distribution(rollers.history)
         document |= {"around": rollers.around, "orders": rollers.orders, "force_shares": shares}
         columns = jc.show.roller_columns(rollers.history)
+        shaft, slip = float(document["shaft_speed_rpm"]), measures.value("cage_slip")
+        notes += jc.show.minimum_load_notes(model.bearing, float(model.load), shaft, slip)
+        k, hardness = float(model.wear.wear_coefficient), float(model.wear.hardness) / 1e9
+        said = "wear is proportional to K, which is known to a decade or two at best"
+        notes.append(f"Wear by Archard's law with K = {k:g} and a hardness of {hardness:g} GPa: {said}")
     said = ", ".join(f"{n.replace('_', ' ')} {measures[n].value:.4g}" for n in TOLD if n in measures)
-    note = f"Error of a revolution: at most {found.error:.0e} of the scale ({found.outcome})"
     files = {"figure": jc.show.run_figure(model, found, rollers, title), "data": columns}
     tables = jc.show.run_tables(title, measures, rollers)
-    return Answer(f"At {where}: {said}.", tables, [note], document, files, part=f"_{speed:g}rpm")
+    return Answer(f"At {where}: {said}.", tables, notes, document, files, part=f"_{speed:g}rpm")
 
 
 def sweep(

@@ -28,6 +28,7 @@ from .contacts import (
     land_forces,
     pocket_contact,
     raceway_contact,
+    rolling_resistance,
 )
 from .field import AbstractField
 
@@ -67,6 +68,8 @@ class Forces(NamedTuple):
     drag_across: Many
     churning: Many
     drag_power: Many
+    rolling: tuple[Many, Many] | None = None
+    """Couples of rolling resistance of outer and inner ring on the roller, where they are considered [N m]."""
     land: LandForces | None = None
 
 
@@ -82,7 +85,7 @@ class Passed(NamedTuple):
     """Force of the inner ring on the roller [N]."""
     inner_y: Many
     inner_moment: Many
-    """Moment of the traction about the ring's centre [N m]."""
+    """Moment of traction and rolling resistance on the roller about the ring's centre [N m]."""
     outer_moment: Many
     traction: Many
     """Powers that are lost [W], to `drag`."""
@@ -185,7 +188,13 @@ class BearingAtSpeed(AbstractField):
         drag_out, drag_across = drag * rollers.radial, drag * across
         churning = -self.churning * jnp.abs(rollers.spin) * rollers.spin
         power = -(drag_out * rollers.radial + drag_across * across + churning * rollers.spin)
-        return Forces(g, outer, inner, pocket, drag_out, drag_across, churning, power)
+        found = Forces(g, outer, inner, pocket, drag_out, drag_across, churning, power)
+        if self.inner_race.rolling is None:
+            return found
+        by_outer = rolling_resistance(self.outer_race, outer.load, rollers.spin)
+        by_inner = rolling_resistance(self.inner_race, inner.load, rollers.spin)
+        power = power - by_outer * (rollers.spin - self.outer_race.speed) - by_inner * (rollers.spin - self.speed)
+        return found._replace(drag_power=power, rolling=(by_outer, by_inner))
 
     def on_land(self, cage: Bodies) -> LandForces:
         """The guiding land."""
@@ -232,7 +241,11 @@ class BearingAtSpeed(AbstractField):
         across = inner_across + outer.traction + pocket.along * g.lag_cos - pocket.out * g.lag_sin + f.drag_across
         out = out - self.roller_mass * self.model.gravity * g.sin
         across = across - self.roller_mass * self.model.gravity * g.cos
+        on_rings = inner.traction * inner.race_arm, outer.traction * outer.race_arm
         moment = outer.arm * outer.traction - inner.arm * inner.traction + pocket.roller_moment + f.churning
+        if f.rolling is not None:
+            by_outer, by_inner = f.rolling
+            moment, on_rings = moment + by_outer + by_inner, (on_rings[0] + by_inner, on_rings[1] + by_outer)
         per_mass = 1 / self.roller_mass
         rates = (
             rollers.orbit - cage.cage_speed,
@@ -247,8 +260,8 @@ class BearingAtSpeed(AbstractField):
             cage_moment=pocket.cage_moment,
             inner_x=inner_out * g.cos - inner_across * g.sin,
             inner_y=inner_out * g.sin + inner_across * g.cos,
-            inner_moment=inner.traction * inner.race_arm,
-            outer_moment=outer.traction * outer.race_arm,
+            inner_moment=on_rings[0],
+            outer_moment=on_rings[1],
             traction=inner.lost_in_sliding + outer.lost_in_sliding,
             raceway_damping=inner.lost_in_damping + outer.lost_in_damping,
             pocket_friction=pocket.lost_in_sliding,

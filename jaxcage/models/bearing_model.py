@@ -16,13 +16,17 @@ from .._kinematics import land_radius
 from .._parameters import choice, parameter
 from .._pytrees import Scalar, compiled
 from ..bearing import (
+    STARVATION,
     Bearing,
     Lubricant,
     brass,
+    cylinder_drag_coefficient,
     line_contact_approach,
+    line_contact_load,
     load_distribution,
     nu2310,
     raceway_loads_of_all,
+    rolling_couple,
     vg,
 )
 from ..forces import Land, LandContact, RibFilm
@@ -253,6 +257,22 @@ class BearingModel(AbstractForcedSystem):
             beside[:2] = np.asarray(start.clock)
         return row, beside
 
+    def _rolling(self, speed: Scalar) -> Array | None:
+        """Couple of rolling resistance at a contact load of 1 N [N m]."""
+        drag, viscosity, between = self.drag, self.lubricant.kinematic_viscosity, speed - self.outer_speed
+        if drag.rolling_law == "none":
+            return None
+        starvation = STARVATION[drag.rolling_law]
+        return rolling_couple(self.bearing, viscosity, between, drag.rolling_coefficient, starvation)
+
+    def _cylinder(self, speed: Scalar) -> Scalar:
+        """Drag coefficient of a cylinder at the speed of rollers that roll, or 1 where the model gives it."""
+        if self.drag.drag_law == "constant":
+            return 1.0
+        diameter = self.bearing.roller_diameter
+        passing = jnp.abs(self.rolling_cage_speed(speed)) * (self.outer_radius - diameter / 2)
+        return cylinder_drag_coefficient(passing * diameter / self.lubricant.kinematic_viscosity)
+
     def at_speed(self, speed: Scalar) -> BearingAtSpeed:
         """The equations of motion at the shaft speed `speed` [rad/s]."""
         bearing, races, c = self.bearing, self.raceways, self.clearance
@@ -262,6 +282,7 @@ class BearingModel(AbstractForcedSystem):
             1.5 * races.raceway_damping,
             races.raceway_smoothing,
             self.traction.curve,
+            self._rolling(speed),
         )
         contact, film, drag = self.contact, self.film, self.drag
         density = drag.oil_share * self.lubricant.density
@@ -281,7 +302,7 @@ class BearingModel(AbstractForcedSystem):
             ),
             roller_mass=bearing.roller_mass,
             roller_inertia=bearing.roller_mass * half**2 / 2,
-            drag=drag.drag_coefficient * density * half * length,
+            drag=drag.drag_coefficient * self._cylinder(speed) * density * half * length,
             churning=drag.churning_coefficient * density * half**4 * length / 2,
             rolling_cage_speed=self.rolling_cage_speed(speed),
             rolling_spin=self.rolling_spin(speed),
@@ -360,6 +381,7 @@ def state_scale(model: BearingModel, speed: Scalar) -> BearingState:
     # A bearing at rest and without load too has a depth of contact and a speed in whose units errors can be stated.
     least = stiff * (LEAST_DEPTH * bearing.roller_diameter) ** (10 / 9)
     force = 4 * model.load / n + bearing.roller_mass * (pitch * model.rolling_cage_speed(speed) ** 2 + model.gravity)
+    force = force + line_contact_load(stiff, -bearing.radial_clearance / 4)
     depth = line_contact_approach(stiff, force + least)
     fast = jnp.sqrt((force + least) / (depth * bearing.roller_mass))
     omega = jnp.hypot(model.rolling_cage_speed(speed), LEAST_SPEED * fast)

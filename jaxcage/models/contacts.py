@@ -23,6 +23,7 @@ from .._arguments import is_concrete
 from .._errors import ArgumentError
 from .._parameters import choice, parameter
 from .._pytrees import Scalar
+from ..bearing import LOAD_POWER, STARVATION
 from ..forces import (
     ContactForce,
     FilmForce,
@@ -176,11 +177,26 @@ def bar_stiffness(
 
 
 class RollerDrag(eqx.Module):
-    """Drag and churning by coefficient; none by default."""
+    """Drag, churning and rolling resistance of rollers, none by default; `bearing.oil_drag` has the laws."""
 
-    drag_coefficient: Scalar = parameter("1", 0.0, 10.0, "drag coefficient C_d of a roller's centre", default=0.0)
+    drag_coefficient: Scalar = parameter(
+        "1",
+        0.0,
+        10.0,
+        "drag coefficient C_d of a roller's centre; with `cylinder` times a cylinder's",
+        default=0.0,
+    )
     churning_coefficient: Scalar = parameter("1", 0.0, 10.0, "churning coefficient C_n of its spin", default=0.0)
     oil_share: Scalar = parameter("1", 0.0, 1.0, "share of oil in the volume between the rings", default=0.02)
+    rolling_coefficient: Scalar = parameter(
+        "1", 0.0, 1e-4, "R_1 of SKF's rolling resistance, in mm, N, rpm, mm^2/s", default=1.2e-6
+    )
+    drag_law: str = choice(
+        "constant", "cylinder", text="drag coefficient: constant, or by Reynolds number", default="constant"
+    )
+    rolling_law: str = choice(
+        "none", *STARVATION, text="supply of oil for the rolling resistance; or none of it", default="none"
+    )
 
 
 class RacewayForces(NamedTuple):
@@ -215,6 +231,20 @@ class RacewayConstants(NamedTuple):
     damping: Scalar
     smoothing: Scalar
     curve: TractionCurve
+    rolling: Scalar | None
+    """Couple of rolling resistance at a load of 1 N [N m], if it is considered."""
+
+
+LIGHT = 1.0
+"""Load [N] below which the couple of rolling resistance falls to zero in proportion."""
+SLOW = 1.0
+"""Speed of rolling [rad/s] below which it does so too."""
+
+
+def rolling_resistance(at: RacewayConstants, load: Scalar, spin: Scalar) -> Scalar:
+    """Couple on a roller against its rotation relative to a ring [N m]: its constant times Q^0.31."""
+    assert at.rolling is not None
+    return -at.rolling * load * (load + LIGHT) ** (LOAD_POWER - 1) * saturated(spin - at.speed, SLOW)
 
 
 def raceway_contact(

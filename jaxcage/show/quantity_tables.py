@@ -69,9 +69,12 @@ def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Tab
     columns = [Column("order of the cage's speed", "order", digits=3), "amplitude"]
     if rollers is None:
         return tables
+    columns += [Column("frequency [Hz]", "frequency_hz", digits=1), Column("at the frequency of", "name")]
+    history = rollers.history
+    turns = abs(history.angle[-1] - history.angle[0]) / (2 * np.pi) / (history.time[-1] - history.time[0])
     for name, spectrum in rollers.spectra.items():
-        lines = map(vars, named_lines(spectrum, rollers.orders))
-        tables.append(table(f"Spectrum, {SPECTRA[name]}", lines, [*columns, Column("at the frequency of", "name")]))
+        lines = [vars(line) | {"frequency_hz": turns * line.order} for line in named_lines(spectrum, rollers.orders)]
+        tables.append(table(f"Spectrum, {SPECTRA[name]}", lines, columns))
     return tables
 
 
@@ -98,6 +101,9 @@ def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed:
     ]
     for guidance, y in displacements(model, shared).items():
         rows.append((f"cage displacement, {guidance.replace('_', ' ')} guidance", y, "m"))
+    celsius = float(model.lubricant.temperature) - 273.15
+    viscosity = 1e6 * model.lubricant.kinematic_viscosity
+    rows.append((f"kinematic viscosity of the oil at {celsius:g} °C", viscosity, "mm^2/s"))
     rows.append(("cage speed over shaft speed", bearing.cage_speed_ratio, "1"))
     if shaft_speed is not None:
         rows += [

@@ -153,8 +153,12 @@ READ = "cage_slip", "pocket_force_max_N", "friction_power_W"
 """Variables of a data set that `motion_table` shows."""
 
 
-def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float) -> list[str]:
-    """Note that compares the load of a bearing [N] with the makers' rules for the minimum load."""
+SKIDS = 0.02
+"""Slip of the cage from which a bearing is said to skid."""
+
+
+def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float, slip: float | None = None) -> list[str]:
+    """The makers' rules for the least load beside the load of a bearing, and whether a computed slip disagrees."""
     like, rating = listed_like(bearing), static_load_rating(bearing)
     rules = [
         ("C0/60, with C0 by ISO 76" if like is None else f"C0/60 of {like.designation}", like and like.static_rating)
@@ -167,4 +171,14 @@ def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float) -> list[str]
     below = [words for words, value in rules if load < value]
     said = "; ".join(f"{value / 1e3:.2g} kN ({words})" for words, value in rules)
     verdict = f"the load of {load / 1e3:.3g} kN is {'below ' + ' and '.join(below) if below else 'above all of them'}"
-    return [f"Minimum load against skidding at {shaft_rpm:.0f} rpm of the shaft: {said}; {verdict}"]
+    notes = [f"Minimum load against skidding at {shaft_rpm:.0f} rpm of the shaft: {said}; {verdict}"]
+    if slip is None:
+        return notes
+    given, skids = f"the computed slip of the cage is {slip:.2%}", slip >= SKIDS
+    if skids and not below:
+        notes.append(f"The model disagrees with the makers' rules: {given}, although the load is above all of them")
+    if not skids and len(below) == len(rules):
+        why = "they hold without preload" if bearing.radial_clearance < 0 else "more oil would make it slip more"
+        said = f"although the load is below all of them; {why}"
+        notes.append(f"The model disagrees with the makers' rules: {given}, {said}")
+    return notes

@@ -1,0 +1,140 @@
+"""`python -m benchmarks.trends [--quick]`: slip against experiments and makers' rules, as `benchmarks/trends.md`.
+
+NU2310 as `jaxcage init --model bearing` writes it, with the drag and rolling resistance of its oil. A slip is the mean
+of the second half of a run that begins with rolling; its error is the change from the first half to the second, so
+that slip that still grows is uncertain. A cage below a twentieth of its speed has a slip of 95 % at least.
+"""
+
+import argparse
+import pathlib
+import tomllib
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+import jaxcage as jc
+from benchmarks.common import made_with, markdown
+from jaxcage.files import model_from, template
+
+
+PAGE = pathlib.Path(__file__).with_suffix(".md")
+SPEED = 6700.0
+"""Reference speed of the bearing, of the shaft [rpm]."""
+LIGHT = 300.0
+"""Load at which the slip is compared [N]."""
+SKIDDING = 0.02
+"""Slip at which a bearing begins to skid."""
+LIGHTEST, HEAVIEST = 500.0, 5e3
+"""Loads [N] between which it is sought."""
+STALLED = 0.95
+"""Least slip of a cage that is too slow to be followed."""
+KELLER = "Guo, Keller, Tribol. Int. 148 (2020) 106347"
+DAWOUD = "Dawoud, Beitler, Schwarze, J. Tribol. 145(2) (2023)"
+SKF = "SKF, Rolling bearings (2018), page 509"
+
+
+class Trend(NamedTuple):
+    """A trend, what is known of it, and what the model makes of it."""
+
+    what: str
+    expected: str
+    source: str
+    found: str
+    verdict: str
+
+
+def bearing(**changed: float) -> jc.BearingModel:
+    """The bearing with parameters changed."""
+    return jc.replace(model_from(tomllib.loads(template("bearing"))), **changed)
+
+
+def slip(model: jc.BearingModel, rpm: float, revolutions: int) -> tuple[float, float]:
+    """Slip of the cage and its error; half of the revolutions are left out."""
+    speed = jc.rpm(rpm)
+    run = jc.simulate(model, speed, revolutions=revolutions // 2, discard=revolutions // 2, samples=32)
+    if run.outcome == "outside":
+        return STALLED, 0.0
+    if run.outcome not in ("successful", "inaccurate"):
+        raise RuntimeError(f"{rpm:g} rpm, {float(model.load):g} N: {run.outcome}")
+    middle = len(run.time) // 2
+    turns = np.array([run.angle[middle] - run.angle[0], run.angle[-1] - run.angle[middle]])
+    rates = turns / np.array([run.time[middle] - run.time[0], run.time[-1] - run.time[middle]])
+    before, after = 1 - rates / float(model.rolling_cage_speed(speed))
+    return float(after), abs(float(after - before))
+
+
+def series(name: str, values: Sequence[float], revolutions: int) -> list[tuple[float, float]]:
+    """Slip and error at `LIGHT` for values of a parameter."""
+    found = []
+    for value in values:
+        found.append(slip(bearing(**{"load": LIGHT, name: value}), SPEED, revolutions))
+        print(f"  {name} {value:g}: slip {found[-1][0]:.4f} +- {found[-1][1]:.4f}", flush=True)
+    return found
+
+
+def verdict(sign: int, found: Sequence[tuple[float, float]]) -> str:
+    """Whether slips rise (1) or fall (-1) from each value to the next, by more than twice their errors."""
+    rise = [sign * (b - a) for (a, _), (b, _) in zip(found[:-1], found[1:], strict=True)]
+    error = [2 * float(np.hypot(a, b)) for (_, a), (_, b) in zip(found[:-1], found[1:], strict=True)]
+    if any(r < -e for r, e in zip(rise, error, strict=True)):
+        return "disagree"
+    return "agree" if all(r > e for r, e in zip(rise, error, strict=True)) else "undecided"
+
+
+def load_at_skidding(rpm: float, revolutions: int, steps: int) -> float:
+    """Load at which the slip passes `SKIDDING` [N], by bisection of its logarithm; half of the last range uncertain."""
+    low, high = LIGHTEST, HEAVIEST
+    for _ in range(steps):
+        middle = float(np.sqrt(low * high))
+        skids = slip(bearing(load=middle), rpm, revolutions)[0] > SKIDDING
+        low, high = (middle, high) if skids else (low, middle)
+    print(f"  load at {SKIDDING:.0%} slip, {rpm:g} rpm: {low:.0f} to {high:.0f} N", flush=True)
+    return float(np.sqrt(low * high))
+
+
+def trends(revolutions: int, steps: int, few: bool) -> list[Trend]:
+    """All trends."""
+    one, two = (load_at_skidding(rpm, revolutions, steps) for rpm in (SPEED, 2 * SPEED))
+    rules, room = jc.bearing.listed("NU2310").minimum_loads(SPEED), (HEAVIEST / LIGHTEST) ** (0.5**steps)
+    known = f"{rules[0]:.0f} to {rules[1]:.0f} N"
+    fits = "agree" if rules[0] / 2 < one < 2 * rules[1] else "disagree"
+    rows = [Trend(f"load at {SKIDDING:.0%} slip, {SPEED:.0f} rpm", f"{known}, within 2", SKF, f"{one:.0f} N", fits)]
+    ratio, off, sure = two / one, abs(np.log(two / one / 1.4)), np.log(room)
+    near = "agree" if off + sure < np.log(1.25) else "disagree" if off - sure > np.log(1.25) else "undecided"
+    rows.append(Trend("the same, at twice the speed over that", "1.4, within 25 %", SKF, f"{ratio:.2f}", near))
+    asked = {
+        ("oil temperature [°C]", "temperature", "falls", KELLER): ((20.0, 40.0, 80.0), 273.15, 1.0),
+        ("radial clearance [µm]", "radial_clearance", "rises", DAWOUD): ((-10.0, 0.0, 20.0, 60.0), 0.0, 1e-6),
+        ("share of oil [%]", "oil_share", "rises", "centre drag is proportional"): ((0.3, 1.5, 5.0), 0.0, 1e-2),
+    }
+    for (what, name, way, source), (shown, offset, unit) in asked.items():
+        values = shown[:: len(shown) - 1] if few else shown
+        found = series(name, [offset + unit * value for value in values], revolutions)
+        row = ", ".join(f"{v:g}: {100 * s:.3g} ± {100 * e:.1g} %" for v, (s, e) in zip(values, found, strict=True))
+        rows.append(Trend(f"slip over {what}", way, source, row, verdict(1 if way == "rises" else -1, found)))
+    return rows
+
+
+def page(rows: Sequence[Trend], revolutions: int) -> str:
+    """The page in Markdown."""
+    about = (__doc__ or "").split("\n\n", 1)[1].strip()
+    text = f"# Trends of slip\n\n{about}\n\nShaft at {SPEED:g} rpm, {LIGHT:g} N, {revolutions} revolutions.\n\n"
+    return f"{text}{markdown(['trend', 'expected', 'source', 'found', 'verdict'], rows)}\n\n{made_with()}\n"
+
+
+def main() -> None:
+    """Compute all trends and write the page; `--quick` prints the ends of each trend from shorter runs."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--quick", action="store_true")
+    quick = parser.parse_args().quick
+    jc.enable_x64()
+    revolutions = 40 if quick else 200
+    text = page(trends(revolutions, 4 if quick else 7, quick), revolutions)
+    print(text)
+    if not quick:
+        PAGE.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
