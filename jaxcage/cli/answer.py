@@ -6,6 +6,7 @@ import json
 import math
 import os
 import sys
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,8 @@ ENDINGS = {"report": ".html", "file": ".toml"}
 """Extensions of text files, by key."""
 USUAL = ("figure", "data", "curve_data", *ENDINGS)
 """Keys of files whose names do not contain the key."""
+WIDTH = 110
+"""Characters of a line of the sentence that answers."""
 PLAIN = str.maketrans({"±": "+-", "µ": "u", "°": "deg ", "²": "^2", "³": "^3", "–": "-"})
 """ASCII replacements for characters that standard output cannot show."""
 
@@ -102,7 +105,7 @@ def print_answer(answer: Answer, as_json: bool, details: bool = False) -> None:
         notes = [*(answer.details if details else ()), *answer.notes]
         if len(tables) < len(answer.tables) or (answer.details and not details):
             notes.append("More tables and notes: --details")
-        text = "\n\n".join([answer.sentence, *map(str, tables), "\n".join(notes)])
+        text = "\n\n".join([textwrap.fill(answer.sentence, WIDTH), *map(str, tables), "\n".join(notes)])
     try:
         text.encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:

@@ -35,7 +35,7 @@ def check(
     ratio, whose = (1.0, subject.own) if subject.shaft is None else (subject.shaft, "shaft")
     over = f"{ratio * ends[0] * RPM:.0f} to {ratio * ends[1] * RPM:.0f} rpm of the {whose}"
     margins = d.margins(subject.model, ends)
-    margin = jc.show.margin_sentence(margins)
+    margin = jc.show.margin_sentence(margins, whose, ratio)
     say(f"Preliminary: {margin}")
     document: dict[str, Any] = {"operating_rpm": [end * RPM for end in ends]}
     if subject.unknowns and draws:

@@ -99,7 +99,7 @@ def measured_table(found: Narrowed, measured: Sequence[Measurement], beside: Bes
         {"what": str(m), "measured": m.quantity, "rpm": m.cage_rpm, "value": m.words, "off_by_tolerances": float(off)}
         for m, off in zip(measured, found.nearest, strict=True)
     ]
-    columns = ["measured", *speed_columns("cage [rpm]", "rpm", beside), "value"]
+    columns = ["measured", *speed_columns("speed [rpm]", "rpm", beside), "value"]
     title = "Measurements, and how far the nearest draw is off [tolerances]"
     return table(title, rows, [*columns, Column("off", "off_by_tolerances", digits=2)], "measurements")
 

@@ -43,7 +43,7 @@ def requirement_table(title: str, found: Design, beside: Beside = None) -> Table
         rows.append(row | {"rpm": None if after is None else after.rpm})
     columns = ["requirement", UNIT, "limit", "before", "after"]
     columns += [Column("worst in tolerance", "worst")] if found.budget else []
-    return table(title, rows, [*columns, *speed_columns("at cage [rpm]", "rpm", beside)], "requirements")
+    return table(title, rows, [*columns, *speed_columns("at [rpm]", "rpm", beside)], "requirements")
 
 
 def _text(r: Requirement, value: float) -> str:

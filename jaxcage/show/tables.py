@@ -164,7 +164,8 @@ def speed_columns(
     head: str, key: str, beside: Beside, error: str = "", digits: int = 0, nothing: str = NOTHING
 ) -> list[Column]:
     """The column of a speed [rpm], or a difference of speeds, of the model or of what `beside` names."""
-    head, times = (head, 1.0) if beside is None else (f"{head} ({beside[0]})", beside[1])
+    words, unit, _ = head.partition(" [rpm]")
+    head, times = (head, 1.0) if beside is None else (f"{words} ({beside[0]}){unit}", beside[1])
     return [Column(head, key, error=error, digits=None if error else digits, nothing=nothing, times=times)]
 
 

@@ -23,11 +23,10 @@ def range_sentence(over: str, chance: RangeChance | None, checked: Checked | Non
     """Sentence of the verdict, from draws of the unknowns or from simulations of a known design."""
     if chance is not None:
         low, high = chance.interval
-        share = f"{chance.share:.0%}" if chance.known else "unknown"
+        share = f"{100 * chance.share:.0f} %" if chance.known else "unknown"
         words = {"calm": "Calm", "rattles": "The cage rattles", "not decided": "Not decided"}[chance.state]
-        return (
-            f"{words}: over {over} the cage is calm with probability {share} (95 % interval {low:.0%} to {high:.0%})."
-        )
+        bars = f"95 % interval {100 * low:.0f} to {100 * high:.0f} %"
+        return f"{words}: over {over} the cage is calm with probability {share} ({bars})."
     assert checked is not None
     if checked.calm:
         return f"Calm: over {over} all {checked.initial_states} initial states end on the calm motion at every speed."
@@ -36,11 +35,12 @@ def range_sentence(over: str, chance: RangeChance | None, checked: Checked | Non
         return f"The cage rattles: over {over} no simulation ends on a calm motion."
     where = "at every speed" if checked.chaotic_rpm.size == checked.speeds_rpm.size else "at some speeds"
     where = f"and chaos is seen {where}" if checked.chaotic_rpm.size else "the others on other motions"
-    return f"Not calm from every initial state: over {over} {share:.0%} end calm, {where}."
+    return f"Not calm from every initial state: over {over} {100 * share:.1f} % end calm, {where}."
 
 
-def margin_sentence(found: Margins | str) -> str:
-    """Sentence on the margin of the best guess, and on the change that adds most to it."""
+def margin_sentence(found: Margins | str, whose: str, ratio: float) -> str:
+    """Margin of the best guess, and the change that adds most to it; speeds are those of `whose`, `ratio` times as
+    large as the model's."""
     if isinstance(found, str):
         return f"No margin: {found}"
     end, least = found.least
@@ -49,12 +49,14 @@ def margin_sentence(found: Margins | str) -> str:
         return f"At the best guess the synchronous orbit is stable over the whole range, and to {far}."
     said = f"the {end} end of the range is {least.value:.2g} % of its speed away from a loss of stability"
     if least.value < 0:
-        said = f"the synchronous orbit is unstable over {-least.value:.2g} % of the speed at the {end} end of the range"
+        from_, to = (f"{ratio * margin.rpm:.0f}" for margin in (found.lower, found.upper))
+        only = f"from {from_} rpm on" if "upper" in found.open else f"up to {to} rpm" if "lower" in found.open else ""
+        said = f"the synchronous orbit is stable only {only or f'from {from_} to {to} rpm'} of the {whose}"
     if not (changes := found.changes):
         return f"At the best guess {said}."
     first = changes[0]
     what = f"10 % {'more' if first.up else 'less'} {first.name.replace('_', ' ')}"
-    return f"At the best guess {said}; {what} adds {first.gain:.2g} %."
+    return f"At the best guess {said}; {what} adds {first.gain:.2g} % of speed at its {end} end."
 
 
 def margins_table(found: Margins, beside: Beside = None) -> Table:
@@ -65,7 +67,7 @@ def margins_table(found: Margins, beside: Beside = None) -> Table:
         shown = f"above {margin.value:.0f}" if end in found.open else f"{margin.value:.2f}"
         rows.append({"end of the range": end, "margin [%]": shown, "margin": margin.value, "rpm": margin.rpm})
     decay = "does not die out" if math.isinf(found.decay) else f"falls to 1/e in {found.decay:.2g} revolutions"
-    columns = ["end of the range", "margin [%]", *speed_columns("edge at cage [rpm]", "rpm", beside)]
+    columns = ["end of the range", "margin [%]", *speed_columns("edge [rpm]", "rpm", beside)]
     return table(f"Margins of the best guess; a disturbance {decay} at the worst speed", rows, columns, "margins")
 
 
