@@ -1,4 +1,4 @@
-"""The session of docs/transcript.md: a bearing of one's own, by commands alone: `python -m benchmarks.transcript`."""
+"""The session of docs/transcript.md: a spindle bearing, by commands alone: `python -m benchmarks.transcript`."""
 
 import pathlib
 import re
@@ -6,50 +6,69 @@ import shlex
 import subprocess
 import sys
 import tempfile
+import time
 
 
-FILE = "my_bearing.toml"
-VALUES = {
-    "guidance_gap": "0.6 mm",
-    "eccentricity": "30 um",
-    "cage_mass": "0.40 kg",
-    "bore": "60 mm",
-    "outside_diameter": "130 mm",
-    "width": "46 mm",
-    "roller_diameter": "19 mm",
-    "roller_length": "31 mm",
-    "rib_diameter": "109 mm",
-    "inner_raceway_diameter": "77 mm",
-    "pocket_clearance": "0.7 mm",
-    "temperature": "60 degC",
+COMMON = {"designation": '"NU1014"', "grade": "32", "temperature": '"55 degC"', "load": '"1.2 kN"'}
+CAGE = COMMON | {
+    "guidance_gap": '"0.25 mm +- 0.05 mm"',
+    "eccentricity": '"G6.3 at 12000 rpm shaft"',
+    "cage_mass": '"0.18 kg"',
 }
-"""What is edited in the template."""
-SHOWN = "^(guidance|ecc|cage_mass|bore|outside|width|roller_|rib|inner|pocket|temp)"
+BRASS = COMMON | {
+    "guidance_gap": '"0.25 mm"',
+    "eccentricity": '"G6.3 at 12000 rpm shaft"',
+    "cage_mass": '"0.18 kg"',
+    "cage_inertia": '"3.8e-4 kg m^2"',
+    "land_width": '"2.5 mm"',
+    "rolling_coefficient": "1.12e-6",
+}
+PEEK = {"cage_mass": '"0.033 kg"', "cage_inertia": '"7e-5 kg m^2"', "pocket_stiffness": '"4e6 N/m"'}
+INNER = {"guidance": '"inner"\ninner_land_diameter = "83.5 mm"'}
+"""Values that are edited in the templates. Mass and stiffness in PEEK with glass fibres are those in brass times the
+ratios of density and modulus, 1510 to 8400 kg/m^3 and 11 to 102 GPa."""
+RANGE = "--operating '4000-14000 rpm shaft'"
 
 
-def show(command: str, folder: str) -> None:
-    """Run a command of the package and print it with what it says."""
+def run(command: str, folder: str) -> None:
+    """Run a command of the package and print it with its output."""
     words = [sys.executable, "-m", "jaxcage", *shlex.split(command)[1:]]
     print(f"$ {command}", flush=True)
-    subprocess.run(words, cwd=folder, stderr=subprocess.STDOUT, check=True)
+    subprocess.run(words, cwd=folder, stderr=subprocess.DEVNULL, check=True)
+    print(flush=True)
+
+
+def edit(source: str, path: pathlib.Path, values: dict[str, str]) -> None:
+    """Write a file with other values, and print these."""
+    for name, value in values.items():
+        source, count = re.subn(rf"^{name} = .*$", f"{name} = {value}", source, count=1, flags=re.M)
+        assert count, f"the template has no line that sets {name}"
+        print(f"{name} = {value}")
+    path.write_text(source, encoding="utf-8")
     print(flush=True)
 
 
 def main() -> None:
     """Print the session."""
+    began = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
-        show(f"jaxcage init {FILE} --full", folder)
-        path = pathlib.Path(folder, FILE)
-        text = path.read_text(encoding="utf-8")
-        for name, value in VALUES.items():
-            text, count = re.subn(rf"^{name} = .*$", f'{name} = "{value}"', text, count=1, flags=re.M)
-            assert count, f"the template has no line that sets {name}"
-        path.write_text(text, encoding="utf-8")
-        print(f'$ grep -E "{SHOWN}" {FILE}  # after editing')
-        print("\n".join(x for x in text.splitlines() if re.match(SHOWN, x)), end="\n\n", flush=True)
-        for words in ("statics F", "sweep F --draws 0", "design F --steps 8"):
-            show(f"jaxcage {words.replace('F', FILE)}", folder)
-        show(f"jaxcage report {FILE} --quick --operating '5000-8000 rpm'", folder)
+        path = lambda name: pathlib.Path(folder, name)
+        run("jaxcage init spindle.toml", folder)
+        edit(path("spindle.toml").read_text(encoding="utf-8"), path("spindle.toml"), CAGE)
+        run("jaxcage statics spindle.toml --speed 12000", folder)
+        run(f"jaxcage check spindle.toml {RANGE}", folder)
+        run("jaxcage init brass.toml --model bearing", folder)
+        template = path("brass.toml").read_text(encoding="utf-8")
+        edit(template, path("brass.toml"), BRASS)
+        brass = path("brass.toml").read_text(encoding="utf-8")
+        run(f"jaxcage check brass.toml {RANGE}", folder)
+        for name, values in (("peek", PEEK), ("inner", INNER)):
+            print(f"$ cp brass.toml {name}.toml  # and edit")
+            edit(brass, path(f"{name}.toml"), values)
+            run(f"jaxcage check {name}.toml {RANGE}", folder)
+        run("jaxcage simulate brass.toml --speed 12000 --revolutions 20", folder)
+        run(f"jaxcage report spindle.toml --quick {RANGE}", folder)
+    print(f"Time in all: {(time.monotonic() - began) / 60:.1f} min")
 
 
 if __name__ == "__main__":

@@ -23,6 +23,8 @@ RANGE_SPEEDS = 32
 """Number of speeds of the operating range at which draws are simulated."""
 STEP = 0.1
 """Relative change of a parameter for which effects are given."""
+KELVINS = 10.0
+"""The same of a temperature [K]."""
 SMALL = 0.02
 """Effects below this fraction of the largest one are not listed."""
 RESAMPLED = 400
@@ -136,9 +138,10 @@ class Margins:
         for i, name in enumerate(self.names):
             if not least.slope[i]:
                 continue
-            gain = STEP * abs(least.slope[i])
+            step = KELVINS / self.now[i] if name == "temperature" else STEP
+            gain = float(step * abs(least.slope[i]))
             up = bool(least.slope[i] > 0)
-            other = STEP * (1 if up else -1) * float((self.upper if end == "lower" else self.lower).slope[i])
+            other = step * (1 if up else -1) * float((self.upper if end == "lower" else self.lower).slope[i])
             limit = float(self.now[i] * (1 - least.value / least.slope[i]))
             rows.append(Change(name, float(self.now[i]), up, gain, other, limit))
         rows.sort(key=lambda row: -row.gain)
@@ -146,8 +149,8 @@ class Margins:
 
 
 class Change(NamedTuple):
-    """First-order effect of 10 % more (`up`) or less of a parameter: `gain` of the least margin, and `other` of that at
-    the other end, per cent of speed. `limit` is the value at which the edge would reach the range [SI]."""
+    """First-order effect of 10 % or 10 K more (`up`) or less of a parameter: `gain` of the least margin, and `other` of
+    that at the other end, per cent of speed. `limit` is the value at which the edge would reach the range [SI]."""
 
     name: str
     value: float
@@ -155,6 +158,11 @@ class Change(NamedTuple):
     gain: float
     other: float
     limit: float
+
+    @property
+    def amount(self) -> str:
+        """Size of the change."""
+        return f"{KELVINS:g} K" if self.name == "temperature" else f"{100 * STEP:g} %"
 
 
 def margins(model: Any, operating: tuple[float, float]) -> Margins | str:

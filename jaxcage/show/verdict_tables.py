@@ -55,7 +55,7 @@ def margin_sentence(found: Margins | str, whose: str, ratio: float) -> str:
     if not (changes := found.changes):
         return f"At the best guess {said}."
     first = changes[0]
-    what = f"10 % {'more' if first.up else 'less'} {first.name.replace('_', ' ')}"
+    what = f"{first.amount} {'more' if first.up else 'less'} {first.name.replace('_', ' ')}"
     return f"At the best guess {said}; {what} adds {first.gain:.2g} % of speed at its {end} end."
 
 
@@ -78,7 +78,7 @@ def changes_table(model: Any, found: Margins) -> Table:
     for change in found.changes[:MOST]:
         row = dict(change._asdict()) | {"parameter": change.name.replace("_", " "), "unit": info[change.name].unit}
         limit = change.limit if abs(change.limit / change.value - 1) <= FAR else None
-        rows.append(row | {"change": "+10 %" if change.up else "-10 %", "limit": limit})
+        rows.append(row | {"change": f"{'+' if change.up else '-'}{change.amount}", "limit": limit})
     columns = ["parameter", UNIT, Column("now", "value", OWN), "change"]
     columns.append(Column(f"adds to {end} margin [%]", "gain", digits=2))
     columns += [Column(f"to {other} margin [%]", "other", digits=2), Column("may reach", "limit", OWN)]
