@@ -54,7 +54,8 @@ def check(
     tables = [] if isinstance(margins, str) else [jc.show.margins_table(margins, subject.beside)]
     if not isinstance(margins, str) and margins.changes:
         tables.append(jc.show.changes_table(subject.model, margins))
-    return Answer(f"{said} {margin}", tables + decide, [note], document, by_ranges=bool(decide))
+    model = 'The cage model prescribes the impacts of the rollers; slip and forces: a file with model = "bearing"'
+    return Answer(f"{said} {margin}", tables + decide, [note, model], document, by_ranges="draws" in document)
 
 
 def _with_rollers(subject: Subject, ends: tuple[float, float]) -> Answer:
@@ -63,6 +64,7 @@ def _with_rollers(subject: Subject, ends: tuple[float, float]) -> Answer:
     jc.show.require_some(found)
     notes = jc.show.minimum_load_notes(subject.model.bearing, float(subject.model.load), ends[1] * RPM)
     notes += [f"{jc.show.MOTIONS[name]}: {words}" for name, words in jc.show.MOTION_WORDS.items()]
+    notes.append("The motion is that of the cage: rollers that rattle in their pockets do not count")
     notes.append(f"{SPEEDS} speeds, {found.sizes['initial_state']} initial states, {jc.analysis.length(found)}")
     document = {"operating_rpm": [end * RPM for end in ends], "verdict": jc.show.cage_verdict(found)}
     over = f"{ends[0] * RPM:.0f} to {ends[1] * RPM:.0f} rpm of the {subject.own}"
