@@ -33,8 +33,8 @@ def public_names(layer: str = "") -> list[str]:
     """The names that a layer offers, or those of `jaxcage` itself, without the layers."""
     file = PACKAGE / layer / "__init__.py" if layer else PACKAGE / "_public.py"
     names = []
-    for node in ast.parse(file.read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.ImportFrom) and node.module:
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module != "typing":
             names += [alias.asname for alias in node.names if alias.asname]
         elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
             names.append(node.target.id)
