@@ -80,7 +80,7 @@ class Subject:
         return {"speed_rpm": own, "cage_speed_rpm": cage, "shaft_speed_rpm": shaft}
 
     def speed_columns(self, speed: Any) -> dict[str, Any]:
-        """The same as columns of a file."""
+        """Speeds of cage and shaft as columns of a file."""
         return {f"{key.removesuffix('_rpm').replace('_', ' ')} [rpm]": x for key, x in self.both(speed).items()}
 
     def at(self, speed: float) -> str:

@@ -127,7 +127,7 @@ def read_description(path: str | Path) -> Description:
 
 
 def describe(table: Mapping[str, Any]) -> Description:
-    """The same for a nested mapping as read from TOML. **Raises:** `ConfigError`."""
+    """Check a nested mapping as read from TOML. **Raises:** `ConfigError`."""
     subject = _subject(table)
     module, bases = (declarations()["subjects"][subject][key] for key in ("module", "bases"))
     base, speeds = table.get("base"), table.get("speeds", "shaft" if subject == "bearing" else "cage")

@@ -1,4 +1,4 @@
-"""What was measured on a machine, from a CSV file: whirl frequencies, sizes of orbits, speeds at which it rattles.
+"""Measurements on a machine from a CSV file: whirl frequencies, sizes of orbits, speeds at which it rattles.
 
     quantity, speed, value, tolerance
     whirl frequency, 12000 rpm shaft, 83 Hz, 2 Hz
@@ -39,7 +39,7 @@ class Measurement:
     value: float = math.nan
     """[SI]; NaN for `rattles` and `calm`."""
     tolerance: float = math.nan
-    """What the value may be off at most [SI]."""
+    """Largest error of the value [SI]."""
 
     def __str__(self) -> str:
         at = f"{self.quantity} at {self.cage_rpm:.0f} rpm of the cage"

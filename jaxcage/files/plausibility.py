@@ -24,7 +24,7 @@ def check_together(model: CageModel | BearingModel) -> None:
 
 
 def _checks(model: CageModel | BearingModel) -> Iterator[tuple[bool, str, str]]:
-    """Whether a value is wrong, its key, and what it must be, beside what it is."""
+    """True for a wrong value, with its key and the words for what it must be and what it is."""
     b: Any = model.bearing
     mm = lambda value: 1e3 * float(value)
     gap, eccentricity, rib = mm(model.guidance_gap), mm(model.eccentricity), mm(b.rib_diameter)

@@ -50,7 +50,7 @@ class BearingState(NamedTuple):
     rollers: Float[Array, "5 rollers"]
     """Rows as in `Rollers`."""
     bodies: Float[Array, " 9"]
-    """As in `Bodies`."""
+    """Coordinates, in the order of `Bodies`."""
     clock: Float[Array, " 2"]
     """Angle of the cage [rad] and time [s]."""
 
@@ -130,6 +130,6 @@ class Rates(NamedTuple):
 
     state: BearingState
     integrals: Float[Array, " integrals"]
-    """As in `INTEGRATED`."""
+    """Integrals, in the order of `INTEGRATED`."""
     watched: Float[Array, " watched"]
-    """As in `WATCHED`."""
+    """Largest values, in the order of `WATCHED`."""
