@@ -171,6 +171,7 @@ def calm_figure(found: "Design", operating: tuple[float, float], title: str = ""
             for edge in (low, high):
                 ax.annotate(f"{edge:.0f}", (edge, row + 0.3), ha="center", fontsize=8)
         ax.set(yticks=[0, 1], yticklabels=["after", "before"], ylim=(-0.6, 1.8))
+        ax.use_sticky_edges = False  # bars would end at the frame
         ax.margins(x=0.08)
         ax.set_title("Stable range of the synchronous orbit", fontsize=9, loc="left")
         label_speed(ax)

@@ -172,7 +172,7 @@ def exponent_strip(sweep: xr.Dataset, ax: Axes | None = None) -> Axes:
     if "strobe" in sweep:
         threshold = {"color": style.VERMILION, "linewidth": 0.8, "linestyle": "--"}
         ax.axhline(CHAOS_THRESHOLD, **threshold, label=f"chaotic above {CHAOS_THRESHOLD}")
-    ax.plot(np.repeat(rpm, largest.shape[1]), largest.ravel(), **style.dots(style.GREY, 3), label="each start")
+    ax.plot(np.repeat(rpm, largest.shape[1]), largest.ravel(), **style.dots(style.GREY, 3), label="each initial state")
     shade = {"color": style.SKY, "alpha": 0.5, "linewidth": 0, "label": "±2 standard errors"}
     ax.fill_between(rpm, top - band, top + band, **shade)
     ax.plot(rpm, top, color=style.BLUE, linewidth=0.9, label="largest of the initial states")
