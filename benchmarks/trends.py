@@ -74,7 +74,7 @@ def series(name: str, values: Sequence[float], revolutions: int) -> list[tuple[f
 
 
 def verdict(sign: int, found: Sequence[tuple[float, float]]) -> str:
-    """Whether slips rise (1) or fall (-1) from each value to the next, by more than twice their errors."""
+    """Compare slips that should rise (`sign` 1) or fall (-1) from each value to the next, by twice their errors."""
     rise = [sign * (b - a) for (a, _), (b, _) in zip(found[:-1], found[1:], strict=True)]
     error = [2 * float(np.hypot(a, b)) for (_, a), (_, b) in zip(found[:-1], found[1:], strict=True)]
     if any(r < -e for r, e in zip(rise, error, strict=True)):

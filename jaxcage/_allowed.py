@@ -29,7 +29,7 @@ class ParameterInfo:
     kind: Kind = "fixed"
     """Kind of source, see `SOURCES`."""
     source: str = ""
-    """Where its value comes from, or what to measure."""
+    """Source of the value, or how to measure it."""
 
 
 UNKNOWN = "?"

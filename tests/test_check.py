@@ -25,18 +25,27 @@ def test_probability_of_a_range_is_joint():
     chaotic, failed = np.zeros((64, 2), bool), np.zeros((64, 2), bool)
     chaotic[:4, 0] = chaotic[2:8, 1] = True
     failed[6:10, 0] = True
-    chance, rough = range_chance(ensemble(chaotic, failed), 900, 2100)
+    chance, rough, known = range_chance(ensemble(chaotic, failed), 900, 2100)
     assert (chance.chaotic, chance.known, chance.draws) == (8, 62, 64)
-    assert chance.share == 1 - 8 / 62 and rough.sum() == 8
+    assert chance.share == 1 - 8 / 62 and rough.sum() == 8 and known.sum() == 62
     assert chance.state == "not decided"
     # Clopper and Pearson, 8 and 10 of 64: scipy.stats.binomtest(k, 64).proportion_ci()
     assert chance.interval == pytest.approx((1 - 0.2685, 1 - 0.0555), abs=1e-3)
 
 
+def test_failed_draws_are_never_counted_as_calm():
+    """61 calm draws of 64 are calm, unless the other three failed and one more is chaotic."""
+    chaotic, failed = np.zeros((64, 2), bool), np.zeros((64, 2), bool)
+    failed[:3, 0] = True
+    assert range_chance(ensemble(chaotic, failed), 900, 2100)[0].state == "calm"
+    chaotic[10, 1] = True
+    assert range_chance(ensemble(chaotic, failed), 900, 2100)[0].state == "not decided"
+
+
 def test_an_index_tells_what_decides():
     """An outcome that one unknown decides alone has index 1 for it, and none for three others."""
     chaotic = np.repeat((np.arange(128) < 32)[:, None], 2, axis=1)
-    rows = indices(ensemble(chaotic, unknowns=4), chaotic[:, 0])
+    rows = indices(ensemble(chaotic, unknowns=4), chaotic[:, 0], np.ones(128, bool))
     assert [row.label for row in rows if row.telling] == ["u0"]
     assert rows[0].share > 0.95 and rows[0].quarters == (1.0, 0.0)
 

@@ -13,7 +13,7 @@ RPM = np.pi / 30
 
 
 def test_drag_of_a_cylinder():
-    """By hand at 6080, and against points of the measured curve as a program for skidding rollers has them."""
+    """The fit agrees with a hand calculation at 6080 and with tabulated points of the measured curve."""
     by_hand = 1.18 + 6.8 / 2334.0 + 1.96 / 77.97 - 2.432 / 14.456
     assert float(jb.cylinder_drag_coefficient(6080.0)) == pytest.approx(by_hand, rel=1e-3)
     points = {1.0: 10.0, 10.0: 3.0, 1e3: 1.0, 1e4: 1.2, 2e5: 1.2}

@@ -322,7 +322,7 @@ def test_a_revolution_of_a_stiff_bearing():
 
 @pytest.mark.slow
 def test_preload_prevents_skidding():
-    """In the oil's drag rollers skid at 300 N and a clearance of 40 um; with preload all roll, even without load."""
+    """Rollers skid in the oil's drag at 300 N and a clearance of 40 um; with preload all roll, even without load."""
     oil = {"drag.drag_law": "cylinder", "drag.rolling_law": "bath", "drag_coefficient": 1.0, "oil_share": 0.015}
     slips, loads = {}, {}
     for clearance, load in ((40e-6, 300.0), (-10e-6, 0.0)):

@@ -41,8 +41,8 @@ def check(
     if subject.unknowns and draws:
         speeds, told = np.linspace(*ends, d.RANGE_SPEEDS), partial(report, "draws")
         drawn = d.ensemble(subject.model, subject.unknowns, speeds, draws=draws, seed=seed, progress=told)
-        chance, chaotic = d.range_chance(drawn, ends[0] * RPM, ends[1] * RPM)
-        rows = d.indices(drawn, chaotic)
+        chance, *outcomes = d.range_chance(drawn, ends[0] * RPM, ends[1] * RPM)
+        rows = d.indices(drawn, *outcomes)
         said, note = jc.show.range_sentence(over, chance, None), jc.show.indices_note(rows)
         document |= {"verdict": chance.state, "calm_share": chance.share, "calm_interval": chance.interval}
         document |= {"draws": draws, "chaotic_draws": chance.chaotic, "known_draws": chance.known}

@@ -24,7 +24,7 @@ RANGE_SPEEDS = 32
 STEP = 0.1
 """Relative change of a parameter for which effects are given."""
 KELVINS = 10.0
-"""The same of a temperature [K]."""
+"""Change of a temperature for which effects are given [K]."""
 SMALL = 0.02
 """Effects below this fraction of the largest one are not listed."""
 RESAMPLED = 400
@@ -58,17 +58,22 @@ class RangeChance(NamedTuple):
 
     @property
     def state(self) -> State:
-        """`calm` or `rattles` if at least 95 % of the draws agree, else `not decided`."""
-        found = verdict_of(self.chaotic, self.known, self.draws)
-        return "calm" if found.startswith("calm") else "rattles" if found.startswith("chaotic") else "not decided"
+        """`calm` or `rattles` if at least 95 % of the draws agree, whatever the failed ones would do, else `not
+        decided`."""
+        words: dict[str, State] = {"calm": "calm", "chaotic": "rattles"}
+        return words.get(verdict_of(self.chaotic, self.known, self.draws), "not decided")
 
 
-def range_chance(found: Ensemble, low_rpm: float, high_rpm: float) -> tuple[RangeChance, Bool[np.ndarray, " draws"]]:
-    """Chance that a draw is calm at all speeds of a range [rpm], and True for the draws that are chaotic in it."""
+Draws = Bool[np.ndarray, " draws"]
+
+
+def range_chance(found: Ensemble, low_rpm: float, high_rpm: float) -> tuple[RangeChance, Draws, Draws]:
+    """Chance that a draw is calm at all speeds of a range [rpm]; True for draws that are chaotic in it, and for those
+    of which this is known."""
     which = found.between(low_rpm, high_rpm)
     chaotic = np.any(found.chaotic[:, which] & ~found.failed[:, which], axis=1)
     known = chaotic | ~np.any(found.failed[:, which], axis=1)
-    return RangeChance(int(chaotic.sum()), int(known.sum()), len(chaotic)), chaotic
+    return RangeChance(int(chaotic.sum()), int(known.sum()), len(chaotic)), chaotic, known
 
 
 class Index(NamedTuple):
@@ -87,13 +92,15 @@ class Index(NamedTuple):
         return self.share > 2 * self.error > 0
 
 
-def indices(found: Ensemble, chaotic: Bool[np.ndarray, " draws"]) -> list[Index]:
-    """First-order indices of all unknown values for chaos in the range, largest first; empty if all draws agree."""
-    if np.all(chaotic == chaotic[0]):
+def indices(found: Ensemble, chaotic: Draws, known: Draws) -> list[Index]:
+    """First-order indices of all unknown values for chaos in the range, over the known draws, largest first; empty if
+    all of these agree."""
+    y, places = chaotic[known].astype(float), found.place[known]
+    if not np.any(y != y[:1]):
         return []
-    y, count = chaotic.astype(float), len(chaotic)
+    count = len(y)
     picks, rows = np.random.default_rng(0).integers(count, size=(RESAMPLED, count)), []
-    for unknown, place, source in zip(found.unknowns, found.place.T, found.sources, strict=True):
+    for unknown, place, source in zip(found.unknowns, places.T, found.sources, strict=True):
         again = [explained(place[p], y[p]) for p in picks]
         quarters = float(y[place < 0.25].mean()), float(y[place > 0.75].mean())
         rows.append(Index(unknown.label, explained(place, y), float(np.std(again)), source, quarters))

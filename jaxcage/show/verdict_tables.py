@@ -115,11 +115,14 @@ MOTION_WORDS = {
 
 
 def cage_verdict(found: xr.Dataset) -> str:
-    """Verdict over all speeds and initial states: `calm`, `circling`, `rattles` or `rattles in part`."""
+    """Verdict over all speeds and initial states: `calm`, `circling`, `rattles` or `rattles in part`; `not decided` if
+    simulations failed and none of the others rattles."""
     label = found["label"].values
     some = [name for name in MOTIONS if np.any(label == name)]
     if "disordered" in some:
         return "rattles" if some == ["disordered"] else "rattles in part"
+    if np.any(label == "failed"):
+        return "not decided"
     return "circling" if "circular" in some else "calm"
 
 
@@ -130,7 +133,8 @@ def motion_sentence(over: str, found: xr.Dataset) -> str:
     counts = {words: int(np.sum(label == name)) for name, words in MOTIONS.items()}
     shares = ", ".join(f"{words} in {n}" for words, n in counts.items() if n)
     verdict = cage_verdict(found)
-    said = {"calm": "Calm", "circling": "Calm or circling"}.get(verdict, "The cage " + verdict)
+    words = {"calm": "Calm", "circling": "Calm or circling", "not decided": "Not decided"}
+    said = words.get(verdict, f"The cage {verdict}")
     where = f", from {rpm[rough].min():.0f} to {rpm[rough].max():.0f} rpm" if rough.any() and not rough.all() else ""
     failed = int(np.sum(label == "failed"))
     lost = f"; {failed} failed" if failed else ""
@@ -160,7 +164,7 @@ SKIDS = 0.02
 
 
 def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float, slip: float | None = None) -> list[str]:
-    """The makers' rules for the least load beside the load of a bearing, and whether a computed slip disagrees."""
+    """Notes that compare the load of a bearing [N] with the makers' rules, and these with a computed slip."""
     like, rating = listed_like(bearing), static_load_rating(bearing)
     rules = [
         ("C0/60, with C0 by ISO 76" if like is None else f"C0/60 of {like.designation}", like and like.static_rating)
