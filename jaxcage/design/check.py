@@ -64,7 +64,7 @@ def check_design(
     found = sweep(model, speeds, initial_states=states, progress=told)
     labels, counts = np.unique(found["label"].values, return_counts=True)
     shares = dict(zip(labels.tolist(), (counts / counts.sum()).tolist(), strict=True))
-    rpm, where = speeds * 30 / np.pi, np.flatnonzero(restless(found))
+    rpm, where = found["rpm"].values, np.flatnonzero(restless(found))
     lives = np.array([survival_at(found, int(i)).mean_life for i in where])
     method = json.loads(found.attrs["settings"])["method"]
     return Checked(rpm, states.shape[1], shares, int(np.sum(failed(found))), rpm[where], lives, method)

@@ -75,6 +75,26 @@ class Observation(NamedTuple):
     """Position of the cage centre relative to its land, over the clearance, at each sample; only for models with
     averages."""
 
+    @classmethod
+    def pending(cls, model: AbstractForcedSystem, run: Run, count: int) -> "Observation":
+        """Results of lanes that have not been run: NaN, with the outcome of a failure."""
+        nan = lambda *shape: np.full((count, *shape), np.nan)
+        beside, watched, samples = len(model.beside), len(model.watched) - 1, run.revolutions * model.samples
+        strobe, growth = nan(run.keep, model.dimension), nan(run.followed, run.exponents)
+        return cls(
+            outcome=np.full(count, NOT_FINITE, dtype=np.int32),
+            last=nan(model.dimension),
+            strobe=strobe,
+            growth=growth,
+            peak=nan(),
+            error=nan(),
+            doubt=nan(run.exponents),
+            steps=nan(),
+            integrals=nan(run.blocks, beside),
+            largest=nan(run.blocks, watched),
+            place=nan(samples if beside else 0, 2),
+        )
+
     def put(self, lanes: Int[np.ndarray, " some"], new: "Observation") -> None:
         """Replace the results of some lanes."""
         for mine, theirs in zip(self, new, strict=True):
