@@ -41,7 +41,7 @@ def report(stage: str, done: int, total: int) -> None:
 
 
 def report_lanes(stage: str, done: int, total: int) -> None:
-    """Report progress of lanes. **Raises:** `Stop` after an interruption, for an answer from those that are finished."""
+    """Report progress of lanes. **Raises:** `Stop` after an interruption, for an answer from the finished ones."""
     global _heard
     if _stops:
         raise Stop
