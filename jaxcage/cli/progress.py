@@ -28,8 +28,8 @@ Report: TypeAlias = Callable[[str, int, int], None]
 _number: int = signal.SIGINT
 _advice = FILES_ARE_WHOLE
 """Words for a user who interrupts."""
-_computes = _stops = False
-"""True during a computation, and after it was asked to stop."""
+_computes = _stops = _stopped = False
+"""True during a computation, after it was asked to stop, and after its lanes were stopped."""
 _heard = -math.inf
 """Time of the last report of lanes."""
 _report: Report = lambda stage, done, total: None
@@ -42,8 +42,9 @@ def report(stage: str, done: int, total: int) -> None:
 
 def report_lanes(stage: str, done: int, total: int) -> None:
     """Report progress of lanes. **Raises:** `Stop` after an interruption, for an answer from the finished ones."""
-    global _heard
+    global _heard, _stopped
     if _stops:
+        _stopped = True
         raise Stop
     _heard = time.monotonic()
     report(stage, done, total)
@@ -51,7 +52,7 @@ def report_lanes(stage: str, done: int, total: int) -> None:
 
 def interrupted() -> bool:
     """True if the answer is that of the lanes that were finished when the user interrupted."""
-    return _stops
+    return _stopped
 
 
 def advice() -> str:
@@ -126,9 +127,9 @@ def _on_interruption(number: int, frame: FrameType | None) -> None:
 @contextlib.contextmanager
 def progress(text: str) -> Iterator[None]:
     """Around a computation: a bar in a terminal, a line every ten seconds elsewhere, and how long a stage takes."""
-    global _computes, _stops, _report
+    global _computes, _stops, _stopped, _report
     advise(FILES_ARE_WHOLE)
-    _computes, _stops = True, False
+    _computes, _stops, _stopped = True, False, False
     try:
         with _bar(text) if sys.stderr.isatty() else contextlib.nullcontext(None) as bar:
             _report = _timed(text, bar)

@@ -102,14 +102,17 @@ def sweep(
 
 
 def swept(subject: Subject, speeds: Any, run: o.RunOptions, out: str | None = None) -> tuple[Any, Answer]:
-    """The data set of a sweep over speeds [rad/s], and the answer about it; `out` keeps finished lanes of a bearing
-    with its rollers."""
+    """The data set of a sweep over speeds [rad/s], and the answer about it. With a folder `out` for finished lanes of a
+    bearing with its rollers the sweep can be stopped."""
     kept, settings = None, jc.lanes.Run.of(subject.model, **run.settings)
     if subject.with_rollers and out is not None:
-        given = {name: float(x) for name, x in jc.parameters(subject.model).items()}, speeds.tolist(), run.settings
+        numbers = {name: float(x) for name, x in jc.parameters(subject.model).items()}
+        given = numbers, speeds.tolist(), run.settings, jc.solve.cores()
         kept = Path(out) / f"sweep_{subject.name}_unfinished_{zlib.crc32(repr(given).encode()):08x}.zarr"
         advise("finished speeds are kept, and the same command goes on from there")
-    told = partial(report_lanes, f"lanes of {settings.discard + settings.revolutions} revolutions")
+    told = partial(
+        report if out is None else report_lanes, f"lanes of {settings.discard + settings.revolutions} revolutions"
+    )
     found = jc.sweep(subject.model, speeds, **run.settings, progress=told, store=kept)
     jc.show.require_some(found)
     zones, title = zones_of(found), f"{subject.name}, {jc.analysis.length(found)}"

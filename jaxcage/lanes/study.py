@@ -64,7 +64,8 @@ def study(
     - `initial_states`: number of the model's own initial states to run at each point, by default all.
     - `lanes`: maximum number of lanes per chunk; by default 2048, or fewer for models with expensive lanes.
     - `shard`: (i, n) runs every n-th chunk from the i-th on. All shards write to the same folder.
-    - `progress`: function called with the numbers of finished and of all lanes, including those already stored.
+    - `progress`: function called with the numbers of finished and of all lanes, including those already stored. If it
+        raises `jaxcage.lanes.Stop`, the results so far are returned.
     - `name`, `version`: name and version of your own code, required if the model contains a function or class of your
         own, since a store cannot detect that it has changed: change the version whenever the code changes.
     - `settings`: fields of `jaxcage.lanes.Run`; lanes are neither confirmed nor followed to a horizon.
