@@ -110,9 +110,8 @@ def swept(subject: Subject, speeds: Any, run: o.RunOptions, out: str | None = No
         given = numbers, speeds.tolist(), run.settings, jc.solve.cores()
         kept = Path(out) / f"sweep_{subject.name}_unfinished_{zlib.crc32(repr(given).encode()):08x}.zarr"
         advise("finished speeds are kept, and the same command goes on from there")
-    told = partial(
-        report if out is None else report_lanes, f"lanes of {settings.discard + settings.revolutions} revolutions"
-    )
+    stage = f"lanes of {settings.discard + settings.revolutions} revolutions"
+    told = partial(report if out is None else report_lanes, stage)
     found = jc.sweep(subject.model, speeds, **run.settings, progress=told, store=kept)
     jc.show.require_some(found)
     zones, title = zones_of(found), f"{subject.name}, {jc.analysis.length(found)}"
