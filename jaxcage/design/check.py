@@ -19,8 +19,8 @@ SPEEDS = 24  # simulated over the operating range
 @dataclasses.dataclass(frozen=True)
 class Checked:
     """Results of simulations of a design over speeds [rpm] of its operating range: shares of the trajectories by label,
-    the speeds at which some are chaotic, and the mean life of chaos there [revolutions], infinite where none ended, NaN if it was not
-    followed."""
+    the speeds at which some are chaotic, and the mean life of chaos there [revolutions], infinite where none ended, and
+    NaN after a stop."""
 
     speeds_rpm: Float[np.ndarray, " speeds"]
     initial_states: int

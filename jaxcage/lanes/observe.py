@@ -78,22 +78,13 @@ class Observation(NamedTuple):
     @classmethod
     def pending(cls, model: AbstractForcedSystem, run: Run, count: int) -> "Observation":
         """Results of lanes that have not been run: NaN, with the outcome of a failure."""
-        nan = lambda *shape: np.full((count, *shape), np.nan)
-        beside, watched, samples = len(model.beside), len(model.watched) - 1, run.revolutions * model.samples
-        strobe, growth = nan(run.keep, model.dimension), nan(run.followed, run.exponents)
-        return cls(
-            outcome=np.full(count, NOT_FINITE, dtype=np.int32),
-            last=nan(model.dimension),
-            strobe=strobe,
-            growth=growth,
-            peak=nan(),
-            error=nan(),
-            doubt=nan(run.exponents),
-            steps=nan(),
-            integrals=nan(run.blocks, beside),
-            largest=nan(run.blocks, watched),
-            place=nan(samples if beside else 0, 2),
-        )
+        dim, beside = model.dimension, len(model.beside)
+        shapes: dict[str, tuple[int, ...]] = {"last": (dim,), "strobe": (run.keep, dim), "doubt": (run.exponents,)}
+        shapes |= {"growth": (run.followed, run.exponents), "integrals": (run.blocks, beside)}
+        shapes |= {"largest": (run.blocks, len(model.watched) - 1)}
+        shapes |= {"place": (run.revolutions * model.samples if beside else 0, 2)}
+        numbers = (np.full((count, *shapes.get(name, ())), np.nan) for name in cls._fields[1:])
+        return cls(np.full(count, NOT_FINITE, dtype=np.int32), *numbers)
 
     def put(self, lanes: Int[np.ndarray, " some"], new: "Observation") -> None:
         """Replace the results of some lanes."""
