@@ -19,9 +19,8 @@ SHORT = "--discard 1 --revolutions 2"
 
 @pytest.fixture
 def eight_at_once(monkeypatch: pytest.MonkeyPatch):
-    """Eight lanes run to their end before others begin."""
+    """Eight lanes run to their end before others begin, if they are stored."""
     monkeypatch.setattr("jaxcage.lanes.run.cores", lambda: 1)
-    monkeypatch.setattr("jaxcage.lanes.run.VECTORS", 1)
 
 
 def stop_at_half(done: int, total: int) -> None:
@@ -63,7 +62,7 @@ def interrupt(stage, done, total):
     if done > 0.6 * total:
         os.kill(os.getpid(), signal.SIGINT)
 
-run.cores, run.VECTORS = lambda: 1, 1
+run.cores = lambda: 1
 if sys.argv.pop(1) == "interrupted":
     progress._timed = lambda text, bar: interrupt
 sys.exit(main())

@@ -23,9 +23,8 @@ from .settings import Run
 from .store import Store, Study
 
 
-VECTORS = 32
-"""Vectors of lanes per processor core that run to their end before others begin; one for models with several samples
-per revolution, whose lanes take many seconds."""
+PARTS = 4
+"""Number of parts of a run, each run to its end before the next begins, if no store keeps finished lanes."""
 
 
 def run_lanes(plan: Plan, run: Run, progress: Progress | None = None, store: Store | None = None) -> xr.Dataset:
@@ -59,7 +58,8 @@ def run_lanes(plan: Plan, run: Run, progress: Progress | None = None, store: Sto
         return _labelled(seen.at(lanes), scale[lanes])
 
     try:
-        chunks = range(0, count, _at_once(plan)) if store is None else range(store.study.grid.chunks)
+        size = max(-(-count // PARTS), WIDTH * cores())
+        chunks = range(0, count, size) if store is None else range(store.study.grid.chunks)
         for chunk in chunks:
             if store is None:
                 some = np.arange(chunk, min(chunk + chunks.step, count))
@@ -84,11 +84,6 @@ def run_lanes(plan: Plan, run: Run, progress: Progress | None = None, store: Sto
     label = _motions(finished, plan.model.samples) if several else _labelled(finished, scale).label
     found = dataset(plan, run, finished, scale, label, rounds, escape, end)
     return found if whole == plan.shape[0] else found.isel({next(iter(plan.axes)): slice(whole)})
-
-
-def _at_once(plan: Plan) -> int:
-    """Number of lanes that are run to their end before others begin."""
-    return WIDTH * cores() * (1 if plan.model.samples > 1 else VECTORS)
 
 
 def _stored(store: Store, chunk: int, run: Callable[[], Observation]) -> Observation:
@@ -156,5 +151,5 @@ def sweep(
         return run_lanes(plan, run, progress)
     if isinstance(model, Sequence) or not isinstance(initial_states, int | None):
         raise ArgumentError("store", said="goes with one model from its own initial states, but others were given.")
-    grid = Grid({SPEED: plan.coordinates[SPEED][1]}, {}, 0, 0, plan.shape[1], _at_once(plan))
+    grid = Grid({SPEED: plan.coordinates[SPEED][1]}, {}, 0, 0, plan.shape[1], WIDTH * cores())
     return run_lanes(plan, run, progress, Store(store, Study(model, grid, run, observations=True)))
