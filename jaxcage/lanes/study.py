@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import functools
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -114,8 +115,13 @@ def run_study(
     total, left = lanes(part), lanes(pending)
     report(total - left, total)
     for chunk in pending:
-        done = total - left
-        store.write(chunk, _chunk(about, chunk, lambda _, __, done=done: report(done, total)))
+        begun, done = time.monotonic(), total - left
+
+        def ask(*_: int, begun: float = begun, done: int = done) -> None:
+            if time.monotonic() > begun + 1:  # so that `progress` can stop a long chunk
+                report(done, total)
+
+        store.write(chunk, _chunk(about, chunk, ask))
         left -= lanes([chunk])
         report(total - left, total)
     if not store.pending():
