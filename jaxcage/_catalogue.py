@@ -1,4 +1,4 @@
-"""Rows of `bearing/catalogue.csv` by designation and of `bearing/cage_materials.csv` by name: nothing here loads JAX."""
+"""Bearings of `bearing/catalogue.csv` and materials of `bearing/cage_materials.csv` by name: nothing here loads JAX."""
 
 import csv
 import functools

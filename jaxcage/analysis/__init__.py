@@ -33,6 +33,7 @@ from .measures import (
     Measures as Measures,
     cage_forces as cage_forces,
     cage_history as cage_history,
+    largest_forces as largest_forces,
     measures as measures,
 )
 from .rollers import (

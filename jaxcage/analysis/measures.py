@@ -12,12 +12,14 @@ from .._pytrees import compiled
 from ..forces import Force
 from ..models import CAGE_QUANTITIES, FORCES, AbstractForcedSystem, CageHistory, CageModel
 from ..quantities import Quantity, averaged, notebook_html
-from ..solve import Trajectory
+from ..solve import Trajectory, simulate
 from .labels import scatter
 
 
 BATCH = 256
 """Number of samples whose forces are computed at a time."""
+SETTLED, OBSERVED = 100, 8
+"""Revolutions before those over which the largest forces are sought, and of these."""
 
 
 @compiled
@@ -67,6 +69,13 @@ def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.
     of their classes, each (F_x, F_y) [N] at every sample, at the speed of that sample.
     """
     return dict(cage_history(model, trajectory).forces)
+
+
+def largest_forces(model: CageModel, speed: float) -> dict[str, float]:
+    """Largest size [N] of every force on the cage at a speed [rad/s], over revolutions after the start has died out;
+    NaN where they fail."""
+    forces = cage_forces(model, simulate(model, speed, revolutions=OBSERVED, discard=SETTLED))
+    return {name: float(np.max(np.hypot(*force.T))) for name, force in forces.items()}
 
 
 class Measured(NamedTuple):

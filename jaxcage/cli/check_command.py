@@ -51,11 +51,14 @@ def check(
         checked = d.check_design(subject.model, ends, progress=report_lanes)
         said, note, decide = jc.show.range_sentence(over(checked.speeds_rpm), None, checked), f"Checked: {checked}", []
         document |= {"verdict": "calm" if checked.calm else "not calm", "checked": checked}
+    forces = {f"{ratio * end * RPM:.0f} rpm": jc.analysis.largest_forces(subject.model, end) for end in ends}
+    notes = [jc.show.forces_note(forces, [u.label for u in subject.unknowns]), note]
     tables = [] if isinstance(margins, str) else [jc.show.margins_table(margins, subject.beside)]
     if not isinstance(margins, str) and margins.changes:
         tables.append(jc.show.changes_table(subject.model, margins))
     model = 'The cage model prescribes the impacts of the rollers; slip and forces: a file with model = "bearing"'
-    return Answer(f"{said} {margin}", tables + decide, [note, model], document, by_ranges="draws" in document)
+    tables += [*decide, jc.show.forces_table(forces)]
+    return Answer(f"{said} {margin}", tables, [*notes, model], document, by_ranges="draws" in document)
 
 
 def _with_rollers(subject: Subject, ends: tuple[float, float]) -> Answer:

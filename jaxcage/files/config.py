@@ -116,14 +116,16 @@ def _filled(root: Part, material: CageMaterial, start: Any) -> Part:
     bearing = start.bearing if given is None else _build(given, getattr(start, "bearing", None), ("bearing",))
     gap = values["guidance_gap"] if "guidance_gap" in values else start.guidance_gap
     body, modulus = cage_body(bearing, gap), material.youngs_modulus
-    made = {"cage_mass": material.density * body.volume}
+    made = {"": {"cage_mass": material.density * body.volume}}
     if "pockets" in parts:
-        made["cage_inertia"] = made["cage_mass"] * body.gyration
-        of_pockets = {"pocket_stiffness": pocket_stiffness(bearing, gap, modulus), "pocket_friction": material.friction}
-        parts["pockets"] = dataclasses.replace(parts["pockets"], values=of_pockets | parts["pockets"].values)
-    elif parts.get("impact") is not None and parts["impact"].module == ImpactFromBearing.__name__:
-        parts["impact"] = dataclasses.replace(parts["impact"], values={"youngs_modulus": modulus} | parts["impact"].values)
-    return dataclasses.replace(root, values=made | values, parts=parts)
+        made[""]["cage_inertia"] = made[""]["cage_mass"] * body.gyration
+        stiffness = pocket_stiffness(bearing, gap, modulus)
+        made["pockets"] = {"pocket_stiffness": stiffness, "pocket_friction": material.friction}
+    elif "impact" in parts and parts["impact"].module == ImpactFromBearing.__name__:
+        made["impact"] = {"youngs_modulus": modulus}
+    for name in parts.keys() & made.keys():
+        parts[name] = dataclasses.replace(parts[name], values=made[name] | parts[name].values)
+    return dataclasses.replace(root, values=made[""] | values, parts=parts)
 
 
 def _named(model: eqx.Module, ranges: Ranges) -> list[Unknown]:

@@ -68,5 +68,8 @@ from .law import (
 from .support import ElasticRib as ElasticRib, RigidRib as RigidRib, Support as Support
 
 
-LAWS: tuple[type[AbstractLaw], ...] = (RibFilm, LandContact, Support, SynchronousImpact, ImpactFromBearing, RollerPassImpact)
+LAWS: tuple[type[AbstractLaw], ...] = (
+    *(RibFilm, LandContact, Support),
+    *(SynchronousImpact, ImpactFromBearing, RollerPassImpact),
+)
 """Built-in laws of a cage and its configuration file, in the order in which forces are listed and added."""
