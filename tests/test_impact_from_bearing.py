@@ -60,7 +60,7 @@ def test_a_light_bar_is_the_limit_of_the_oscillator_of_the_paper():
 
 def test_bars_of_nu2310_as_they_are():
     """A Hertz contact and the bar's own mass change the largest force of the bar on the cage by less than 15 %, and the
-    first harmonic of the force on the roller by 2 %."""
+    first harmonic of the force on the roller by 5 %."""
     model, omega = cage(), 1000.0
     b, body, brass = model.bearing, cage_body(model.bearing, model.guidance_gap), cage_materials()["brass"]
     pulse, mass = model.impact.pulse(model, omega), 1 / (1 / model.bearing.roller_mass + 2 / model.cage_mass)
@@ -74,7 +74,7 @@ def test_bars_of_nu2310_as_they_are():
     assert float(found.bar_force.max()) == pytest.approx(float(pulse.peak), rel=0.15)
     at, force = np.asarray(found.time), np.asarray(found.contact_force)
     once = omega / np.pi * abs(np.trapezoid(force * np.exp(1j * omega * at), at))
-    assert once == pytest.approx(float(pulse.first_harmonic(omega)), rel=0.02)
+    assert once == pytest.approx(float(pulse.first_harmonic(omega)), rel=0.05)
 
 
 def test_derivatives_by_every_parameter_of_the_impact():
@@ -102,6 +102,29 @@ def test_derivatives_by_every_parameter_of_the_impact():
     slopes = dict(zip(names, np.asarray(found), strict=True))
     assert slopes["approach_ratio"] == pytest.approx(1) and slopes["unmatched"] == pytest.approx(1)
     assert 0 < slopes["cage_mass"] < 1 and abs(slopes["youngs_modulus"]) < 0.02
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize(
+    "designation, material", [("NU2310", "brass"), ("NU1014", "brass"), ("NU1014", "PEEK"), ("NU215", "brass")]
+)
+def test_whole_bearings_agree_within_a_factor(designation: str, material: str):
+    """Largest pocket force within 2, first harmonic within 5, at 1.3 and 2 times the reference speed; with `pytest -s`
+    the rows of the table in docs/whole-bearing.md."""
+    found = listed(designation)
+    rib, load = float(found.bearing.rib_diameter), 0.03 * found.dynamic_rating
+    same: dict[str, Any] = {"bearing": {"designation": designation}, "material": material, "load": load}
+    same |= {"guidance_gap": 0.005 * rib, "eccentricity": f"G6.3 at {found.reference_rpm:g} rpm shaft"}
+    same |= {"film": {"land_width": 0.6 * float(found.bearing.land_width_limit)}}
+    alone, whole = cage(**same), model_from(tomllib.loads(template("bearing", True)) | same)
+    shaft = found.reference_rpm * np.array([1.3, 2.0]) * np.pi / 30
+    runs = jc.sweep(whole, shaft, initial_states=2, discard=30, revolutions=40, blocks=4, exponents=0)
+    for i, speed in enumerate(found.bearing.cage_speed_ratio * shaft):
+        peak = float(runs["pocket_force_max_N"][i].mean()), float(alone.impact.pulse(alone, speed).peak)
+        once = float(runs["synchronous_force_x_N"][i].mean()), float(amplitude(alone, speed))
+        row = f"{peak[0]:.0f} | {peak[1]:.0f} | {peak[0] / peak[1]:.2f} | {once[0]:.2f} | {once[1]:.2f}"
+        print(f"| {designation}, {material} | {shaft[i] * 30 / np.pi:.0f} | {row} | {once[0] / once[1]:.2f} |")
+        assert 1 / 2 < peak[0] / peak[1] < 2 and 1 / 5 < once[0] / once[1] < 5
 
 
 # --- materials -------------------------------------------------------------------------------------------------------

@@ -29,6 +29,7 @@ from .labels import (
     too_few_revolutions as too_few_revolutions,
 )
 from .measures import (
+    ONE_ROLLER as ONE_ROLLER,
     Measured as Measured,
     Measures as Measures,
     cage_forces as cage_forces,

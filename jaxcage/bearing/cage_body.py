@@ -17,7 +17,7 @@ from .line_contact import line_contact_stiffness
 
 HEIGHT = 0.52
 """Radial height of the cage over the roller diameter."""
-FLANGE = 0.7
+FLANGE = 0.65
 """Width of the ring beside the pockets over the room beside the rollers."""
 
 APPROACH = 1e-6

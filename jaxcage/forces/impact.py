@@ -186,13 +186,15 @@ class ImpactFromBearing(AbstractLaw):
 
     f_x = A sin tau with A = 2 n Q_1 cos(theta), theta the half angle of the loaded zone. (15) takes for Q the largest
     force of an impact. That cannot be: an impact lasts a hundredth of a revolution, and a sine of that size would pass
-    on some fifty times the momentum that a roller has. Q_1 is the first harmonic of the pulse instead, which passes on
-    what the roller loses. It depends on masses, clearance and speed (A grows as its square) and hardly on the
-    stiffness, which determines the largest force of an impact.
+    on fifty times and more the momentum that a roller loses, more than all rollers have. Q_1 is the first harmonic of
+    the pulse instead, which passes on what one roller loses. It depends on masses, clearance and speed (A grows as its
+    square) and hardly on the stiffness, which determines the largest force of an impact.
 
     Rollers that hit alike cancel but for the multiples of Z: n counts the impacts per revolution that do not. Both
-    constants are unknown. The largest pocket forces of whole bearings (NU2310, NU1014, NU215, cages of brass and PEEK,
-    0.6 to 2 times the reference speed) correspond to kappa = 1.8 to 4.3, and their first harmonics to n = 0.04 to 2.5.
+    constants are unknown. In whole bearings (NU2310, NU1014, NU215, cages of brass and PEEK, with and without drag, 0.6
+    to 2 times the reference speed) the largest pocket forces correspond to kappa = 1.8 to 4.4, the more the slower,
+    since rollers also push steadily, and the first harmonics to n = 0.03 to 2.5. Their rollers and pockets are
+    identical, and only the unbalance tells one place of the cage from another.
     """
 
     law_name = "impact"

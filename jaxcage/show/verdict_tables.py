@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from .._parameters import parameter_info
+from ..analysis import ONE_ROLLER
 from ..bearing import listed_like, static_load_rating
 from ..design import Checked, Index, Margins, RangeChance
 from .tables import OWN, UNIT, Beside, Column, Table, speed_columns, table
@@ -94,9 +95,10 @@ def forces_table(found: Mapping[str, Mapping[str, float]]) -> Table:
 
 
 def forces_note(found: Mapping[str, Mapping[str, float]], unknown: Sequence[str]) -> str:
-    """Note on the largest force at the last speed, with the names of the unknown values that decide it."""
+    """Note on the largest lasting force at the last speed, with the names of the unknown values that decide it."""
     at, forces = list(found.items())[-1]
-    first, second, *_ = sorted(forces, key=lambda name: np.nan_to_num(forces[name]), reverse=True)
+    lasting = [name for name in forces if name != ONE_ROLLER]
+    first, second, *_ = sorted(lasting, key=lambda name: np.nan_to_num(forces[name]), reverse=True)
     said = f"Largest force on the cage at {at}: {first}, {forces[first] / forces[second]:.2g} times the next, {second}"
     by = [label for label in unknown if label.startswith(f"{first}.")]
     return f"{said}; unknown about it: {', '.join(by)}" if by else said
