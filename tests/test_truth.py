@@ -116,8 +116,8 @@ def test_no_section_finds_anything_wrong():
 
 
 def spindle() -> jc.CageModel:
-    """A bearing of one's own, as from the template of `jaxcage init` with a few lines changed, under the impacts of case
-    1a, which throw its cage against the land."""
+    """A bearing of one's own, as from the template of `jaxcage init` with a few lines changed; impacts as in case 1a
+    throw its cage against the land."""
     given = tomllib.loads(template())
     given |= dict(guidance_gap="0.25 mm", clearance_reading="radial", unbalance="physical", load="800 N")
     lengths = dict(bore=50, outside_diameter=80, width=16, roller_diameter=7, roller_length=7, rib_diameter=70)

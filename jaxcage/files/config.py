@@ -122,7 +122,7 @@ def _filled(root: Part, material: CageMaterial, start: Any) -> Part:
         stiffness = pocket_stiffness(bearing, gap, modulus)
         made["pockets"] = {"pocket_stiffness": stiffness, "pocket_friction": material.friction}
     elif "impact" in parts and parts["impact"].module == ImpactFromBearing.__name__:
-        made["impact"] = {"youngs_modulus": modulus}
+        made["impact"] = {"cage_modulus": modulus}
     for name in parts.keys() & made.keys():
         parts[name] = dataclasses.replace(parts[name], values=made[name] | parts[name].values)
     return dataclasses.replace(root, values=made[""] | values, parts=parts)

@@ -218,11 +218,11 @@ class ImpactFromBearing(AbstractLaw):
         source="once-a-revolution part of the acceleration of the cage, or of the pocket forces of the whole bearing",
         default=0.5,
     )
-    youngs_modulus: Scalar = parameter("Pa", 1e8, 1e12, "Young's modulus of the cage", kind="catalogue", default=102e9)
+    cage_modulus: Scalar = parameter("Pa", 1e8, 1e12, "Young's modulus of the cage", kind="catalogue", default=102e9)
 
     def pulse(self, cage: GuidedCage, speed: Scalar) -> BarPulse:
         """Force of one roller on its bar at a cage speed [rad/s]."""
-        b, bar = cage.bearing, pocket_stiffness(cage.bearing, cage.guidance_gap, self.youngs_modulus)
+        b, bar = cage.bearing, pocket_stiffness(cage.bearing, cage.guidance_gap, self.cage_modulus)
         v0 = approach_speed(self.approach_ratio, speed, b.pocket_clearance)
         return bar_pulse(b.roller_mass, cage.cage_mass, bar, v0)
 

@@ -16,7 +16,7 @@ SHOWN = {"m^2/s": ("mm²/s", 1e6, 0.0), "K": ("°C", 1.0, -273.15), "Pa": ("GPa"
 """Display unit of a parameter, factor from SI, and offset."""
 READY_MADE = {("bearing", "designation"): "catalogue, {}", ("lubricant", "grade"): "grade {}"}
 BY_MATERIAL = {
-    *(("cage_mass",), ("cage_inertia",), ("impact", "youngs_modulus")),
+    *(("cage_mass",), ("cage_inertia",), ("impact", "cage_modulus")),
     *(("pockets", "pocket_stiffness"), ("pockets", "pocket_friction")),
 }
 """Paths of parameters that follow from the material of the cage."""

@@ -127,7 +127,7 @@ def train(given: dict[str, Any], omega: float, zone: float) -> np.ndarray:
 def from_bearing(given: dict[str, Any], omega: float) -> float:
     """Amplitude [N] of a roller and half a ring's mass that meet on a bar, once in a revolution, by integration."""
     bearing, impact = given["bearing"], given["impact"]
-    length, across, soft = bearing["roller_length"], bearing["roller_diameter"], impact["youngs_modulus"]
+    length, across, soft = bearing["roller_length"], bearing["roller_diameter"], impact["cage_modulus"]
     thick = math.pi * (bearing["inner_raceway_diameter"] + across) / bearing["n_rollers"]
     thick, high = thick - across - bearing["pocket_clearance"], 0.52 * across
     second = high * thick**3 / 12
