@@ -166,6 +166,7 @@ def test_what_a_file_gives_wins_over_its_material():
     whole = tomllib.loads(template("bearing", True)) | {"material": "PEEK", "pockets": {"pocket_friction": 0.2}}
     model = model_from(whole | {"cage_mass": "60 g"})
     assert float(model.cage_mass) == pytest.approx(0.06) and float(model.pockets.pocket_friction) == 0.2
+    assert float(model.cage_inertia) == pytest.approx(0.06 * float(cage_body(model.bearing, 0.45e-3).gyration))
     made = float(pocket_stiffness(model.bearing, model.guidance_gap, 11e9))
     assert float(model.pockets.pocket_stiffness) == pytest.approx(made)
     assert describe(whole).estimated[-3:] == ("cage_mass", "cage_inertia", "pockets.pocket_stiffness")

@@ -118,7 +118,7 @@ def _filled(root: Part, material: CageMaterial, start: Any) -> Part:
     body, modulus = cage_body(bearing, gap), material.youngs_modulus
     made = {"": {"cage_mass": material.density * body.volume}}
     if "pockets" in parts:
-        made[""]["cage_inertia"] = made[""]["cage_mass"] * body.gyration
+        made[""]["cage_inertia"] = (made[""] | values)["cage_mass"] * body.gyration
         stiffness = pocket_stiffness(bearing, gap, modulus)
         made["pockets"] = {"pocket_stiffness": stiffness, "pocket_friction": material.friction}
     elif "impact" in parts and parts["impact"].module == ImpactFromBearing.__name__:

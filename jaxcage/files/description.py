@@ -230,6 +230,7 @@ def _require_whole(module: str, given: set[str], path: tuple[str, ...]) -> None:
     if missing := [_dotted(path, name) for name in declared["needed"] if name not in given]:
         ready = [*(f'base = "{name}"' for name in bases), *(['designation = "NU1014"'] if module == "Bearing" else [])]
         hint = f", unless `{ready[0]}` or the like gives the rest" if ready else ""
+        hint += ', or `material = "brass"` or the like the mass' if "cage_mass" in missing else ""
         raise ConfigError(f"`{'`, `'.join(missing)}` must be given{hint}.")
     readings = {name: each["readings"] for name, each in declared["values"].items() if "readings" in each}
     if left := [name for name in readings if name not in given]:
