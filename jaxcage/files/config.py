@@ -113,19 +113,20 @@ def _model(found: Description, unknowns: list[Unknown] | None) -> Any:
 def _filled(root: Part, material: CageMaterial, start: Any) -> Part:
     """A cage or bearing with the values that follow from the material of its cage, where it does not give them."""
     given, parts, values = root.parts.get("bearing"), dict(root.parts), root.values
-    bearing = start.bearing if given is None else _build(given, getattr(start, "bearing", None), ("bearing",))
+    bearing: Any = start.bearing if given is None else _build(given, getattr(start, "bearing", None), ("bearing",))
     gap = values["guidance_gap"] if "guidance_gap" in values else start.guidance_gap
     body, modulus = cage_body(bearing, gap), material.youngs_modulus
-    made = {"": {"cage_mass": material.density * body.volume}}
+    own: dict[str, Any] = {"cage_mass": material.density * body.volume, **values}
+    below: dict[str, dict[str, Any]] = {}
     if "pockets" in parts:
-        made[""]["cage_inertia"] = (made[""] | values)["cage_mass"] * body.gyration
+        own = {"cage_inertia": own["cage_mass"] * body.gyration, **own}
         stiffness = pocket_stiffness(bearing, gap, modulus)
-        made["pockets"] = {"pocket_stiffness": stiffness, "pocket_friction": material.friction}
+        below["pockets"] = {"pocket_stiffness": stiffness, "pocket_friction": material.friction}
     elif "impact" in parts and parts["impact"].module == ImpactFromBearing.__name__:
-        made["impact"] = {"cage_modulus": modulus}
-    for name in parts.keys() & made.keys():
-        parts[name] = dataclasses.replace(parts[name], values=made[name] | parts[name].values)
-    return dataclasses.replace(root, values=made[""] | values, parts=parts)
+        below["impact"] = {"cage_modulus": modulus}
+    for name, made in below.items():
+        parts[name] = dataclasses.replace(parts[name], values={**made, **parts[name].values})
+    return dataclasses.replace(root, values=own, parts=parts)
 
 
 def _named(model: eqx.Module, ranges: Ranges) -> list[Unknown]:
