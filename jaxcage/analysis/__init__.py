@@ -29,10 +29,12 @@ from .labels import (
     too_few_revolutions as too_few_revolutions,
 )
 from .measures import (
+    ONE_ROLLER as ONE_ROLLER,
     Measured as Measured,
     Measures as Measures,
     cage_forces as cage_forces,
     cage_history as cage_history,
+    largest_forces as largest_forces,
     measures as measures,
 )
 from .rollers import (

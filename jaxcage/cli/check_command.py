@@ -51,11 +51,20 @@ def check(
         checked = d.check_design(subject.model, ends, progress=report_lanes)
         said, note, decide = jc.show.range_sentence(over(checked.speeds_rpm), None, checked), f"Checked: {checked}", []
         document |= {"verdict": "calm" if checked.calm else "not calm", "checked": checked}
+    table, largest = forces(subject, ends)
     tables = [] if isinstance(margins, str) else [jc.show.margins_table(margins, subject.beside)]
     if not isinstance(margins, str) and margins.changes:
         tables.append(jc.show.changes_table(subject.model, margins))
     model = 'The cage model prescribes the impacts of the rollers; slip and forces: a file with model = "bearing"'
-    return Answer(f"{said} {margin}", tables + decide, [note, model], document, by_ranges="draws" in document)
+    notes, by_ranges = [largest, note, model], "draws" in document
+    return Answer(f"{said} {margin}", [*tables, *decide, table], notes, document, by_ranges=by_ranges)
+
+
+def forces(subject: Subject, ends: tuple[float, float]) -> tuple[Any, str]:
+    """Table of the forces on the cage at both ends of a range of its speed [rad/s], and a note on the largest."""
+    ratio, whose = (1.0, subject.own) if subject.shaft is None else (subject.shaft, "shaft")
+    found = {f"{ratio * end * RPM:.0f} rpm {whose}": jc.analysis.largest_forces(subject.model, end) for end in ends}
+    return jc.show.forces_table(found), jc.show.forces_note(found, [u.label for u in subject.unknowns])
 
 
 def _with_rollers(subject: Subject, ends: tuple[float, float]) -> Answer:

@@ -188,7 +188,7 @@ def explained(place: np.ndarray, y: np.ndarray) -> float:
     between = sum(part.size * (part.mean() - y.mean()) ** 2 for part in parts)
     within = sum(((part - part.mean()) ** 2).sum() for part in parts)
     noise = (BINS - 1) * within / max(y.size - BINS, 1)
-    return float(max(between - noise, 0.0) / (between + within))
+    return float(max(between - noise, 0.0) / (between + within)) if between + within else 0.0
 
 
 def ensemble(
