@@ -125,7 +125,7 @@ def test_what_is_estimated_of_a_catalogue_bearing_is_named(tmp_path: Path):
     names = "radial_clearance", "effective_length", *rollers
     file = read_bearing(path)
     assert file.estimated == tuple(f"bearing.{name}" for name in names)
-    rows = jc.show.sources_table(file.model, file.table, file.left).records
+    rows = jc.show.sources_table(file.model, file).records
     found = {row["name"].removeprefix("bearing."): row["from"] for row in rows if row["name"].startswith("bearing.")}
     assert {name for name, source in found.items() if source == "estimated for the catalogue"} == {*names}
     assert (found["bore"], found["pocket_clearance"]) == ("catalogue, NU1020", "this file")

@@ -15,9 +15,10 @@ import jaxcage as jc
 from .._errors import InputError
 from . import options as o
 from .answer import Answer
+from .check_command import chances, check
 from .orbit_commands import bars, explained, gradient, mapped, of_orbits
 from .progress import report as tell, visible
-from .speed_commands import chances, simulate, swept, zones_of
+from .speed_commands import simulate, swept
 from .subject import RPM, Subject
 
 
@@ -66,7 +67,8 @@ def statics(
         raise InputError(f"The load of {subject.name} must be above 0 N, but it is {force:g}: give one with --load.")
     shaft = 0.0 if speed is None else float(subject.both(subject.speed(speed))["shaft_speed_rpm"]) / RPM
     found = jc.bearing.load_distribution(bearing, force, bearing.roller_centrifugal_force(shaft))
-    title, loads = f"{subject.name} at {force:g} N, shaft at {shaft * RPM:g} rpm", np.asarray(found.inner_loads)
+    title = f"{subject.name} at {force:g} N, {f'shaft at {shaft * RPM:g} rpm' if shaft else 'at rest'}"
+    loads = np.asarray(found.inner_loads)
     heads = {"angle": "rad", "inner load": "N", "outer load": "N"}
     data = dict(zip(heads, map(np.asarray, (found.roller_angles, loads, found.outer_loads)), strict=True))
     rollers = [
@@ -75,8 +77,8 @@ def statics(
     ]
     columns = [jc.show.Column(name, name.replace(" ", "_"), unit, digits=1) for name, unit in heads.items()]
     tables = [
-        jc.show.statics_table(f"Statics of {title}", model, found, shaft),
-        jc.show.table("Rollers", rollers, columns, "rollers"),
+        jc.show.statics_table(f"Statics of {title}", model, found, shaft or None),
+        jc.show.table("Rollers", rollers, columns, "rollers", detail=True),
     ]
     document: dict[str, Any] = {
         n: float(getattr(found, n)) for n in ("max_load", "shaft_shift", "elastic_approach", "half_angle")
@@ -96,78 +98,77 @@ def report(
     subject: o.Case,
     *,
     over: o.Range = o.Range(),
-    operating: str = "",
+    operating: o.Operating = None,
     draws: o.Draws = 64,
     seed: o.Seed = 0,
     quick: o.Quick = False,
     run: o.RunOptions = o.RunOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """One HTML page about a design: zones, operating speeds, orbits, map, gradients, and how certain it all is.
-
-    Args:
-        operating: Speeds and ranges to assess, e.g. "8500, 12000-15000" [rpm], "900 rad/s" or "20000-24000 rpm shaft".
-    """
-    at = jc.show.read_operating(operating, subject.model, subject.speeds)
-    if operating and not at:
-        raise InputError(f"Option --operating must hold a speed, but '{operating}' was given.")
-    began, said, orbits, loss = time.perf_counter(), [], None, ()
-    speeds = subject.range(over, subject.usual(126 if quick else 251, 5 if quick else 13))
-    found, answer = swept(subject, speeds, run)
-    zones, limits = zones_of(found), (float(found["rpm"][0]), float(found["rpm"][-1]))
+    """One HTML page about a design: the answer of `check`, zones, orbits, map, gradients, and where each value is from."""
+    began, (low, high), name = time.perf_counter(), subject.ends(over), subject.name
+    parts, words, at = [], ["jaxcage", "report", Path(subject.path).name or name], None
+    if operating is not None:
+        parts.append(("Verdict", check(subject, operating=operating, draws=draws, seed=seed)))
+        subject, at = subject.operating(operating)
+        low, high = min(low, at[0]), max(high, at[1])
+        words += ["--operating", f"{operating[0]:g}-{operating[1]:g} rpm {subject.speeds}"]
+    elif subject.unknowns and draws:
+        parts.append(("Chances", chances(subject, subject.range(over, 40), draws, seed, run)))
+    count = over.count or subject.usual(126 if quick else 251, 5 if quick else 13)
+    found, answer = swept(subject, np.linspace(low, high, count), run)
     if subject.with_rollers:
-        parts = [("Over speed", answer), *(_at_one_speed(subject, at[0], quick, run) if at else [])]
+        parts += [("Over speed", answer), *(_at_one_speed(subject, at, quick, run) if at else [])]
     else:
-        ends, told = (float(speeds[0]), float(speeds[-1])), {"method": run.method, "progress": tell}
-        orbits = jc.orbits.synchronous_orbits(subject.model, *ends, settled=found, **told)
-        answer, zones, slopes = explained(subject, found, orbits, answer, quick, run.method)
-        loss = jc.unstable_ranges(orbits).zones
-        parts = [("Zones", answer), *_of_orbits(subject, ends, orbits, slopes, quick, run.method)]
-        if calm := jc.show.calmest((*zones.zones, *zones.transient, *loss), *limits):
-            said.append(f"The widest range outside all zones goes from {calm[0]:.0f} to {calm[1]:.0f} rpm.")
-    if subject.unknowns and draws:
-        chance = chances(subject, o.Range(over.first, over.last), draws, seed, run)
-        parts.insert(0, ("What is known, and what it decides", chance))
-        said.append(f"All zones of this page are those of the best guesses. {chance.sentence}")
+        orbits = jc.orbits.synchronous_orbits(subject.model, low, high, settled=found, method=run.method, progress=tell)
+        answer, slopes = explained(subject, found, orbits, answer, quick, run.method)
+        parts += [("Zones", answer), *_of_orbits(subject, (low, high), orbits, slopes, quick, run.method)]
+    if subject.unknowns:  # all but the first part
+        guess = lambda each: dataclasses.replace(each, sentence=f"At the best guess: {each.sentence}")
+        parts = [*parts[:1], *((f"{title} at the best guess", guess(each)) for title, each in parts[1:])]
     if float(getattr(subject.model, "load", 0.0)) > 0:
-        parts.append(("Statics", statics(subject)))
-    assessed = jc.show.assess(at, found, zones, orbits, loss)
-    verdicts = [jc.show.verdict_table(subject.name, assessed, subject.beside)] if at else []
-    each = [f"{where}: {v.state} ({kind})" for where, by in assessed for kind, v in by.items()]
-    table, left = (None, ()) if subject.file is None else (subject.file.table, subject.file.left)
-    notes, made = subject.about(False)[1], jc.show.settings_table(found, time.perf_counter() - began)
+        fastest = None if at is None else jc.files.SpeedOf(at[1] * RPM, subject.own)
+        parts.append(("Statics", statics(subject, speed=fastest)))
     sections = [
-        jc.show.Section("In short", [*each, answer.sentence, *said], tables=verdicts, notes=notes),
         *(_section(*part) for part in parts),
-        jc.show.Section("The design", tables=[jc.show.sources_table(subject.model, table, left)]),
-        jc.show.Section("How it was computed", tables=[made], notes=[jc.show.PAPER]),
+        jc.show.Section(
+            "The design", tables=[jc.show.sources_table(subject.model, subject.file)], notes=subject.about(False)[1][:1]
+        ),
+        jc.show.Section(
+            "How it was computed",
+            tables=[jc.show.settings_table(found, time.perf_counter() - began)],
+            notes=[jc.show.PAPER],
+        ),
     ]
-    words = ["jaxcage", "report", Path(subject.path).name or subject.name]
-    words += [*(["--operating", operating] if operating else []), *(["--quick"] if quick else [])]
-    title = f"{'Case ' * (subject.published is not None)}{subject.name}"
-    subtitle = f"Cylindrical roller bearing, {limits[0]:.0f} to {limits[1]:.0f} rpm of the {subject.own}"
-    command = visible(shlex.join(words))
+    command = visible(shlex.join([*words, *(["--quick"] if quick else [])]))
+    subtitle = f"Cylindrical roller bearing, {subject.over(low, high)}"
+    title = f"{'Case ' * (subject.published is not None)}{name}"
     html = jc.show.page(title, subtitle, sections, sweep=found, operating=at, command=command)
-    document = {"quick": quick, "bytes": len(html.encode())}
-    document["operating"] = [vars(where) | by for where, by in assessed]
-    return Answer("; ".join(each) or answer.sentence, verdicts, said, document, {"report": html})
+    first = parts[0][1]
+    document = {**first.document, "quick": quick, "bytes": len(html.encode())}
+    return dataclasses.replace(first, document=document, files={"report": html})
 
 
 def _section(title: str, answer: Answer) -> Any:
-    """An answer as a section of the page."""
+    """An answer as a section of the page; titles of figures become captions."""
     from matplotlib.figure import Figure
 
     figures = {name: (x, x.get_suptitle()) for name, x in answer.files.items() if isinstance(x, Figure)}
-    return jc.show.Section(title, [answer.sentence], figures, answer.tables, answer.notes)
+    for figure, _ in figures.values():
+        figure.suptitle("")
+    tables = [each for each in answer.tables if not each.detail]
+    return jc.show.Section(title, [answer.sentence], figures, tables, answer.notes)
 
 
-def _at_one_speed(subject: Subject, at: Any, quick: bool, run: o.RunOptions) -> list[tuple[str, Answer]]:
-    """A run of a bearing with its rollers at an operating speed, and slopes of means there."""
-    speed = jc.files.SpeedOf((at.low_rpm + at.high_rpm) / 2, subject.own)
+def _at_one_speed(
+    subject: Subject, at: tuple[float, float], quick: bool, run: o.RunOptions
+) -> list[tuple[str, Answer]]:
+    """A run of a bearing with its rollers in the middle of its operating range, and slopes of means there."""
+    speed = jc.files.SpeedOf(sum(at) / 2 * RPM, subject.own)
     run = dataclasses.replace(run, discard=20, revolutions=20)
     found, means = simulate(subject, speed=speed, run=run), o.MeanOptions(speed, discard=20, revolutions=20)
     slopes = [] if quick else [("What moves the means", gradient(subject, means=means))]
-    return [(f"At {at}", found), *slopes]
+    return [(f"At {speed:.0f} rpm of the {subject.own}", found), *slopes]
 
 
 def _of_orbits(
@@ -176,10 +177,12 @@ def _of_orbits(
     """Synchronous orbits, a map over speed and guidance gap, and elasticities of edges."""
     found, loss, axis = [], jc.unstable_ranges(orbits), jc.show.parameter_axis(subject.model, "guidance_gap")
     if orbits.branches:
-        found.append(("The synchronous orbit", of_orbits(subject, orbits, loss)))
+        answer = of_orbits(subject, orbits, loss)
+        figure = {"figure": answer.files["figure"]}
+        found.append(("The synchronous orbit", dataclasses.replace(answer, tables=answer.tables[1:], files=figure)))
     edges = {} if quick else {name: edge for name, edge in loss.edges.items() if name in FOLLOWED}
     count, discard, revolutions = ((40, 7), 100, 60) if quick else ((80, 12), 250, 100)
-    length = {"discard": discard, "revolutions": revolutions, "blocks": 1, "keep": 1, "method": method}
+    length = {"discard": discard, "revolutions": revolutions, "blocks": 10, "method": method}
     found.append(("Stability map", mapped(subject, ends, axis, count, edges, {}, length)))
     if trusted := [s for name, s in slopes.items() if s.trusted and name in loss.edges]:
         said = "Relative change of the edges, which are solved for, by that of a parameter that a designer can choose."

@@ -11,8 +11,9 @@ import jaxcage as jc
 from .._errors import ArgumentError, InputError, NoResult
 from . import options as o
 from .answer import Answer
+from .check_command import chances
 from .progress import report
-from .speed_commands import chances, counted, said_of, swept, transient_notes
+from .speed_commands import counted, said_of, swept, transient_notes
 from .subject import RPM, Subject
 
 
@@ -32,7 +33,7 @@ def zones(
     For a bearing with its rollers: ranges of speed with the same motion. For a file with ranges: chances of chaos.
     """
     if subject.unknowns and draws:
-        return chances(subject, over, draws, seed, run)
+        return chances(subject, subject.range(over, 40), draws, seed, run)
     found, answer = swept(subject, subject.range(over, subject.usual(251, 13)), run)
     if subject.with_rollers:
         return answer
@@ -43,9 +44,8 @@ def zones(
 
 def explained(
     subject: Subject, found: Any, orbits: Any, answer: Answer, quick: bool, method: Any
-) -> tuple[Answer, Any, dict[str, Any]]:
-    """Answer on a sweep with the mechanisms of its zones and unstable ranges; chaotic zones; sensitivities of exact
-    edges."""
+) -> tuple[Answer, dict[str, Any]]:
+    """Answer on a sweep with the mechanisms of its zones and unstable ranges; sensitivities of exact edges."""
     name, beside, loss = subject.name, subject.beside, jc.unstable_ranges(orbits)
     known = jc.orbits.explain(jc.zones(found), orbits, subject.model, method)
     slopes = {} if quick else jc.show.edge_slopes(subject.model, loss, known, method)
@@ -56,7 +56,7 @@ def explained(
     ]
     notes = [*transient_notes(subject, known.zones), *jc.show.source_notes(known), *jc.show.unsettled_notes(orbits)]
     said = said_of(subject, found, known.zones)
-    return dataclasses.replace(answer, sentence=said, tables=tables, notes=notes), known.zones, slopes
+    return dataclasses.replace(answer, sentence=said, tables=tables, notes=notes), slopes
 
 
 def _searched(subject: Subject, over: o.Range, discard: int | None, method: Any, purpose: str = "") -> tuple[Any, Any]:
@@ -111,9 +111,11 @@ def of_orbits(subject: Subject, found: Any, loss: Any) -> Answer:
     notes = [
         *jc.show.coexisting_notes(loss),
         *jc.show.unsettled_notes(found),
-        f"Further bifurcations, on unstable parts: {len(found.points) - len(found.edges)} (listed by --json)",
-        f"Settled orbits that are on no branch: {found.missed}",
     ]
+    if further := len(found.points) - len(found.edges):
+        notes.append(f"Further bifurcations, on unstable parts: {further} (listed by --json)")
+    if found.missed:
+        notes.append(f"Settled orbits that are on no branch: {found.missed}")
     without = ", ".join(jc.show.zone_words(zone, beside) for zone in loss.zones) or "none"
     said = f"The synchronous orbit is stable in {len(found.stretches)} ranges of speed; zones without it: {without}."
     document = {"points": [jc.show.point_record(p, found) for p in found.points], "missed": found.missed}

@@ -15,6 +15,7 @@ import jaxcage as jc
 from .._errors import InputError, NoResult
 from . import options as o
 from .answer import Answer
+from .check_command import chances
 from .progress import advise, report, say
 from .subject import RPM, Subject
 from .values import read_vary
@@ -93,7 +94,7 @@ def sweep(
     A file with ranges gives chances of chaos.
     """
     return (
-        chances(subject, over, draws, seed, run)
+        chances(subject, subject.range(over, 40), draws, seed, run)
         if subject.unknowns and draws
         else swept(subject, subject.range(over, subject.usual(251, 13)), run)[1]
     )
@@ -158,23 +159,6 @@ def transient_notes(subject: Subject, zones: Any) -> list[str]:
     """The ranges of chaos that dies out, in a sentence."""
     each = ", ".join(jc.show.zone_words(zone, subject.beside) for zone in getattr(zones, "transient", ()))
     return [f"Transient chaos, with a mean life below {zones.horizon} revolutions: {each}"] if each else []
-
-
-def chances(subject: Subject, over: o.Range, draws: int, seed: int, run: o.RunOptions) -> Answer:
-    """Chances of chaos by speed, of a file with ranges: motions of draws, of at most 100 revolutions after 100."""
-    most = jc.design.REVOLUTIONS
-    length: dict[str, Any] = {name: min(getattr(run, name) or most, most) for name in ("discard", "revolutions")}
-    length |= {"blocks": o.blocks_of(length["revolutions"]), "draws": draws, "seed": seed, "method": run.method}
-    given = subject.model, subject.unknowns, subject.range(over, 40)
-    found = jc.design.ensemble(*given, **length, progress=partial(report, "draws"))
-    if found.failed.all():
-        raise NoResult(f"All {found.failed.size} simulations failed: try more steps (--steps), or narrower ranges.")
-    columns = subject.speed_columns(found.speed)
-    columns |= dict(zip(("chance of chaos", "lower", "upper"), (found.chance, *found.interval), strict=True))
-    figure = jc.show.drawn(partial(jc.show.chance_of_chaos, found), title=f"{subject.name}: {draws} draws")
-    tables, notes = jc.show.chances_tables(subject.name, found, subject.beside), jc.show.chances_notes(found)
-    document, files = jc.show.chances_document(found), {"figure": figure, "data": columns}
-    return Answer(jc.show.chances_answer(found), tables, notes, document, files, by_ranges=True)
 
 
 def poincare(

@@ -17,17 +17,16 @@
 | `design_tables`    | designs before and after a search, shares of variance, tolerances     |
 | `chance_tables`    | chances of chaos, ranges that measurements narrowed                   |
 | `verdict_tables`   | the verdict for an operating range, its margins, what to change first |
-| `operating_speeds` | operating speeds and their place among the zones                      |
 | `report`           | answers of commands as one page of HTML                               |
 """
 
 from .chance_tables import (
-    chances_answer as chances_answer,
     chances_document as chances_document,
     chances_notes as chances_notes,
-    chances_tables as chances_tables,
+    chances_table as chances_table,
     measured_table as measured_table,
     narrowed_table as narrowed_table,
+    unknowns_notes as unknowns_notes,
 )
 from .columns import (
     branch_columns as branch_columns,
@@ -70,13 +69,6 @@ from .maps import (
     parameter_axis as parameter_axis,
     stability_map as stability_map,
     top_exponent as top_exponent,
-)
-from .operating_speeds import (
-    Operating as Operating,
-    assess as assess,
-    calmest as calmest,
-    read_operating as read_operating,
-    verdict_table as verdict_table,
 )
 from .orbit_figures import (
     multiplier_circle as multiplier_circle,

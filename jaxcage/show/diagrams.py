@@ -117,14 +117,16 @@ def mark_published(ax: Axes, published: PublishedCase, text: bool = True) -> Axe
     return ax
 
 
-def mark_operating(ax: Axes, spans: Sequence[Span]) -> None:
-    """Mark operating speeds [rpm] inside the axis: a line for a speed, a light band for a range."""
-    low, high = ax.get_xlim()
-    for first, last in (span for span in spans if span[1] >= low and span[0] <= high):
-        for edge in {first, last}:
-            ax.axvline(edge, color=style.PURPLE, linewidth=1.1, linestyle=(0, (6, 2)), zorder=2)
-        ax.axvspan(first, last, color=style.PURPLE, alpha=0.12, linewidth=0, zorder=0.5)
-    ax.set_xlim(low, high)
+def mark_operating(ax: Axes, first: float, last: float) -> None:
+    """Mark an operating range [rpm] by lines at its ends and an arrow between them."""
+    limits = ax.get_xlim()
+    for edge in (first, last):
+        ax.axvline(edge, color=style.GREY, linewidth=1.0, linestyle=(0, (6, 2)), zorder=2)
+    look: Any = {"arrowprops": {"arrowstyle": "<->", "color": style.GREY}, "xycoords": ax.get_xaxis_transform()}
+    ax.annotate("", (first, 0.94), (last, 0.94), textcoords=ax.get_xaxis_transform(), **look)
+    words = {"ha": "center", "va": "top", "fontsize": 7, "color": style.BLACK, "transform": ax.get_xaxis_transform()}
+    ax.text((first + last) / 2, 0.93, "operating range", **words, clip_on=True)
+    ax.set_xlim(limits)
 
 
 def reported(sweep: xr.Dataset, wanted: Sequence[str]) -> list[str]:

@@ -90,7 +90,7 @@ def source_notes(explained: Explained) -> list[str]:
     """Notes on the edges of chaotic zones that coincide with a bifurcation or the limit of a cascade."""
     edges = [e for zone in explained.zones.zones for e in (zone.onset, zone.exit) if e is not None]
     statistical = sum(e.basis == "statistical" for e in edges)
-    notes = [f"Chaotic edges that stay statistical: {statistical} of {len(edges)}"]
+    notes = [f"Chaotic edges that stay statistical: {statistical} of {len(edges)}"] if edges else []
     for name, source in explained.sources.items():
         if isinstance(source, Cascade):
             doublings = ", ".join(f"{float(p.speed_rpm):.1f}" for p in source.points)

@@ -1,6 +1,5 @@
 """Tables of zones beside the published ones, of bifurcations, and of stable ranges of orbits."""
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -116,7 +115,8 @@ def _beside_published(
     columns += [Column("mean life [revolutions]", "life")] if any(zone.life for zone in zones) else []
     missing = {None: "Published, but not found", -1: "Published beyond this range"}
     notes = [f"{words}: {_words(partners[which])}" for which, words in missing.items() if which in partners]
-    return table("\n".join([title, *notes]), rows, [*columns, *([] if published is None else ["published"])], key)
+    columns += ["published"] if any(row["published"] for row in rows) else []
+    return table("\n".join([title, *notes]), rows, columns, key)
 
 
 def _words(spans: Sequence[Span]) -> str:
@@ -148,7 +148,7 @@ def _details(title: str, zones: Sequence[Zone], beside: Beside, key: str = "") -
     columns = ["zone", *(Column(f"{end} by", f"{end}_mechanism") for end in ENDS)]
     columns.append(Column("share", shown="%", digits=0))
     columns += [Column("mean life [revolutions]", "life")] if any(zone.life for zone in zones) else []
-    return [dataclasses.replace(table(title, rows, columns, key), detail=True)] if rows else []
+    return [table(title, rows, columns, key, detail=True)] if rows else []
 
 
 AT_LIMIT_RPM = 1e-6
@@ -175,7 +175,7 @@ def stretch_table(name: str, found: SynchronousOrbits, beside: Beside = None) ->
     rows, columns = [_stretch_record(s, found) for s in found.stretches], []
     for head, end in (("from", "lower"), ("to", "upper")):
         columns += [*speed_columns(head, f"{end}_rpm", beside, digits=2), Column("by", f"{end}_kind")]
-    columns += [Column("width", "width_rpm", digits=2), Column("settled", "met"), "branch"]
+    columns += [*speed_columns("width [rpm]", "width_rpm", beside, digits=2), Column("settled", "met"), "branch"]
     return table(f"Stable synchronous orbits of {name} [rpm]", rows, columns, "stretches")
 
 
@@ -199,7 +199,7 @@ def edge_table(found: SynchronousOrbits, loss: UnstableRanges, beside: Beside = 
         Column("angle [deg]", "angle_deg", digits=2),
     )
     columns = [*speed, "kind", Column("multiplier", "critical"), angle, "branch", Column("edge of", "name")]
-    return table("Ends of the stable synchronous orbits [rpm]", rows, columns, "edges")
+    return table("Ends of the stable synchronous orbits [rpm]", rows, columns, "edges", detail=True)
 
 
 def unsettled_notes(found: SynchronousOrbits) -> list[str]:
