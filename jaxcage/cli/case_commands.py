@@ -105,7 +105,7 @@ def report(
     run: o.RunOptions = o.RunOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """One HTML page about a design: the answer of `check`, zones, orbits, map, gradients, and where each value is from."""
+    """One HTML page about a design: the answer of `check`, zones, orbits, map, gradients, and sources of all values."""
     began, (low, high), name = time.perf_counter(), subject.ends(over), subject.name
     parts, words, at = [], ["jaxcage", "report", Path(subject.path).name or name], None
     if operating is not None:

@@ -35,6 +35,8 @@ def check(
     d, over = jc.design, subject.over(*ends)
     margins = d.margins(subject.model, ends)
     margin = jc.show.margin_sentence(margins, *(subject.beside or (subject.own, 1.0)))
+    if subject.unknowns and not isinstance(margins, str):
+        margin = f"At the best guess: {margin}"
     say(f"Preliminary: {margin}")
     tables = [] if isinstance(margins, str) else [jc.show.margins_table(margins, subject.beside)]
     if not isinstance(margins, str) and margins.changes:

@@ -118,14 +118,10 @@ def mark_published(ax: Axes, published: PublishedCase, text: bool = True) -> Axe
 
 
 def mark_operating(ax: Axes, first: float, last: float) -> None:
-    """Mark an operating range [rpm] by lines at its ends and an arrow between them."""
+    """Mark the ends of an operating range [rpm] by dashed lines."""
     limits = ax.get_xlim()
     for edge in (first, last):
-        ax.axvline(edge, color=style.GREY, linewidth=1.0, linestyle=(0, (6, 2)), zorder=2)
-    look: Any = {"arrowprops": {"arrowstyle": "<->", "color": style.GREY}, "xycoords": ax.get_xaxis_transform()}
-    ax.annotate("", (first, 0.94), (last, 0.94), textcoords=ax.get_xaxis_transform(), **look)
-    words = {"ha": "center", "va": "top", "fontsize": 7, "color": style.BLACK, "transform": ax.get_xaxis_transform()}
-    ax.text((first + last) / 2, 0.93, "operating range", **words, clip_on=True)
+        ax.axvline(edge, color=style.BLACK, linewidth=0.9, linestyle=(0, (6, 2)), zorder=2)
     ax.set_xlim(limits)
 
 

@@ -195,7 +195,10 @@ def map_figure(axis: Axis, curves: Sequence[Curve], found: xr.Dataset | None, ti
         ax.set_title(column.label, fontsize=10, loc="left")
 
     names = reported(found, MAPPED)
-    draw = [exponents, lambda ax: _colour_labels(ax, *borders, found["label"].values.astype(str))]
+    labels = found["label"].values.astype(str)
+    draw: list[Callable[[Axes], None]] = [exponents]
+    if np.any(labels != labels.flat[0]):
+        draw.append(lambda ax: _colour_labels(ax, *borders, labels))
     draw += [partial(means, name=name) for name in names]
     figure = style.panels(draw, 2, (11.5, 1.0 + 3.8 * ((len(draw) + 1) // 2)), title)
     for ax in figure.axes[1 : len(draw)]:

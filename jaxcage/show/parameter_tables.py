@@ -31,8 +31,8 @@ READINGS = {"clearance_reading": "radial clearance", "unbalance": "unbalance"}
 
 
 def sources_table(model: AbstractForcedSystem, file: BearingFile | None) -> Table:
-    """Table of the parameters of `model` in display units, with their ranges and sources; constants that the file, None
-    for a published case, does not give are left out."""
+    """Table of the parameters of `model` in display units, with their ranges and sources, as given in a file, None for a
+    published case; constants and zeros that it does not give are left out."""
     rows, table, left = [], file and file.table, file.left if file else ()
     ranges = {name: each.range for each in (file.unknowns if file else ()) for name in each.names}
     short = {path: name for name, path in parameter_paths(model).items()}
@@ -55,15 +55,9 @@ def sources_table(model: AbstractForcedSystem, file: BearingFile | None) -> Tabl
             source = _published(model, path, field) if table is None else _in_file(path, table, given)
         row = {"part": " ".join(path[:-1]).replace("_", " ") or "cage", "parameter": text, "value": str(value)}
         rows.append(row | {"shown": unit, "range": between, "from": source, "name": name})
-    columns = [
-        "part",
-        "parameter",
-        "value",
-        *(["range"] if ranges else []),
-        Column("unit", "shown", nothing=""),
-        "from",
-    ]
-    return table_of("Parameters; constants that are at their defaults are left out", rows, columns)
+    between = ["range"] if ranges else []
+    columns = ["part", "parameter", "value", *between, Column("unit", "shown", nothing=""), "from"]
+    return table_of("Parameters; constants, and terms that are 0, are left out", rows, columns)
 
 
 def shown(value: float, unit: str, like: str = "") -> tuple[str, float]:

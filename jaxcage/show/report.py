@@ -68,12 +68,14 @@ def page(
         trim_blocks=True,
     )
 
-    def picture(figure: Figure) -> tuple[str, int, int]:
+    def picture(figure: Figure) -> tuple[str, int, int, str]:
+        marked = ""
         for ax in figure.axes:
             speed = any(each.get_xlabel() in (CAGE, SHAFT) for each in ax.get_shared_x_axes().get_siblings(ax))
             if speed and operating is not None:
                 mark_operating(ax, *(end * 30 / np.pi for end in operating))
-        return _picture(add_shaft_axes(figure, sweep))
+                marked = ". The operating range is between the dashed lines."
+        return *_picture(add_shaft_axes(figure, sweep)), marked
 
     made = {"version": __version__, "command": command, "date": datetime.date.today().isoformat()}
     template = environment.get_template("page.html.j2")

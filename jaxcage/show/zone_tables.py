@@ -75,7 +75,7 @@ def motion_tables(
         title = f"Zones of {name} [rpm], each edge half way between two speeds of the sweep"
         return [table(title, rows, columns, "zones")]
     lasting = f", chaos that lasts beyond {found.horizon} revolutions" if found.horizon else ""
-    title = f"Chaotic zones of {name} [rpm], resolution {found.resolution_rpm:.0f} rpm{lasting}"
+    title = f"Chaotic zones of {name} [rpm]{lasting}"
     span = float(sweep["rpm"][0]), float(sweep["rpm"][-1])
     transient = f"Transient chaos of {name}, mean life below {found.horizon} revolutions"
     return [
@@ -90,7 +90,7 @@ def unstable_table(
 ) -> Table:
     """Table of the unstable ranges of the synchronous orbit, each with the published (chaotic) zones that overlap it
     most."""
-    title = f"Unstable ranges of the synchronous orbit of {name} [rpm], closed below {loss.close_below_rpm:.0f} rpm"
+    title = f"Unstable ranges of the synchronous orbit of {name} [rpm]"
     between = found.lower_rpm, found.upper_rpm
     return _beside_published(title, "unstable_ranges", loss.zones, published, between, beside)
 
@@ -175,7 +175,7 @@ def stretch_table(name: str, found: SynchronousOrbits, beside: Beside = None) ->
     rows, columns = [_stretch_record(s, found) for s in found.stretches], []
     for head, end in (("from", "lower"), ("to", "upper")):
         columns += [*speed_columns(head, f"{end}_rpm", beside, digits=2), Column("by", f"{end}_kind")]
-    columns += [*speed_columns("width [rpm]", "width_rpm", beside, digits=2), Column("settled", "met"), "branch"]
+    columns += [*speed_columns("width [rpm]", "width_rpm", beside, digits=2), Column("simulations on it", "met")]
     return table(f"Stable synchronous orbits of {name} [rpm]", rows, columns, "stretches")
 
 
