@@ -207,7 +207,7 @@ def test_kind_chooses_the_law():
     ({"lubricant": {"temperature": 40}}, "`lubricant.temperature` must be a number from 200"),
     ({"lubricant": {"grade": "68"}}, "`lubricant.grade` must be a number from 2"),
     ({"bearing": {"designation": "6310"}}, "`bearing.designation` must be one of NU1010, .*NU2310"),
-    ({"bearing": {"n_rollers": 40}}, "40 rollers overlap on the pitch circle"),
+    ({"bearing": {"n_rollers": 40}}, "must leave a bar between pockets, which are 6.362 mm apart"),
     ({"bearing": {"rib_diameter": "98 mm"}}, "between the pitch circle and the outer raceway, 81 and 97 mm"),
     ({"bearing": {"outside_diameter": "96 mm"}}, "`bearing.outside_diameter` must be above the outer raceway"),
     ({"bearing": {"roller_length": "41 mm"}}, "`bearing.roller_length` must fit into the rings, 40 mm"),

@@ -183,7 +183,7 @@ def _of_orbits(
     edges = {} if quick else {name: edge for name, edge in loss.edges.items() if name in FOLLOWED}
     count, discard, revolutions = ((40, 7), 100, 60) if quick else ((80, 12), 250, 100)
     length = {"discard": discard, "revolutions": revolutions, "blocks": 10, "method": method}
-    found.append(("Stability map", mapped(subject, ends, axis, count, edges, {}, length)))
+    found.append(("Stability map", mapped(subject, ends, axis, count, edges, length)))
     if trusted := [s for name, s in slopes.items() if s.trusted and name in loss.edges]:
         said = "Relative change of the edges, which are solved for, by that of a parameter that a designer can choose."
         found.append(("What moves the edges", Answer(said, files={"figure": bars(subject, trusted)})))

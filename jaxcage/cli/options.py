@@ -148,8 +148,8 @@ FromTwo = Annotated[int, count(2)]
 OptionalCount = Annotated[int | None, count(1)]
 OptionalZero = Annotated[int | None, count(0)]
 OptionalText = Annotated[str | None, text()]
-Price = Annotated[float | None, _NOT_NEGATIVE]
 Texts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
+Prices = Annotated[Texts, arg(metavar="NAME=NUMBER")]
 Points = Annotated[tuple[int, int] | None, pair("x", _SIDES, lambda a, b: a in SIDE and b in SIDE)]
 Shard = Annotated[tuple[int, int] | None, pair("/", "be I/N with I from 1 to N, e.g. 1/4", lambda i, n: 1 <= i <= n)]
 
@@ -262,8 +262,6 @@ class CalmOptions:
     """Largest power lost by shear of the film [W]."""
     tolerance: OptionalText = None
     """Tolerances within which all of this must hold, e.g. "guidance_gap=+-0.05 mm, eccentricity=G6.3"."""
-    check: FromZero = 16
-    """Initial states from which the result is simulated over the range as a check; 0 leaves it out."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -256,8 +256,7 @@ def map_(
     points: o.Points = None,
     initial_states: o.FromOne = 1,
     persist: o.FromZero = 0,
-    no_points: bool = False,
-    no_curves: bool = False,
+    quick: o.Quick = False,
     run: o.RunOptions = o.RunOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
@@ -270,8 +269,7 @@ def map_(
         points: Grid of simulated points, e.g. 300x300.
         initial_states: Initial states at each point.
         persist: Revolutions that chaos must outlast to count.
-        no_points: Only follow the edges of the synchronous orbit.
-        no_curves: Do not follow the edges of the synchronous orbit.
+        quick: Do not follow the edges of the synchronous orbit.
     """
     model, y = subject.model, y or subject.usual("guidance_gap", "load")
     if y not in (info := jc.parameter_info(model)):
@@ -282,54 +280,45 @@ def map_(
             given |= {} if text is None else {end: jc.files.to_si(text, info[y].unit)}
         except ValueError as error:
             raise ArgumentError(end, said=f"{error}.") from error
-    axis, curves = jc.show.parameter_axis(model, y, **given), not (no_curves or subject.with_rollers)
-    edges, refused = {}, {}
-    if no_points:
-        subject.require_orbits("map --no-points")
+    axis, edges, refused = jc.show.parameter_axis(model, y, **given), {}, {}
     usual = subject.usual({"discard": 1000, "revolutions": 100, "blocks": 20}, {"discard": 20, "revolutions": 20})
     discard = usual["discard"] if run.discard is None else run.discard
     if 0 < persist <= discard:
         raise ArgumentError("persist", said=f"must be 0 or above the {discard} discarded, but is {persist}.")
-    if curves:
+    if not (quick or subject.with_rollers):
         try:
             edges = _searched(subject, over, discard, run.method, "follow")[1].edges
         except NoResult as error:
-            if no_points:
-                raise
             refused = {"edges": str(error).rstrip(".")}
     settings = usual | run.settings | {"initial_states": initial_states, "persist": persist}
-    count = None if no_points else points or subject.usual((50, 12), (13, 8))
-    return mapped(subject, subject.ends(over), axis, count, edges, refused, settings)
+    points = points or subject.usual((50, 12), (13, 8))
+    return mapped(subject, subject.ends(over), axis, points, edges, settings, refused)
 
 
 def mapped(
     subject: Subject,
     ends: tuple[float, float],
     axis: Any,
-    count: tuple[int, int] | None,
+    points: tuple[int, int],
     edges: dict[str, Any],
-    refused: dict[str, str],
     settings: dict[str, Any],
+    refused: dict[str, str] | None = None,
 ) -> Answer:
-    """Answer on a map over speeds [rad/s] and a parameter: simulated points, if any, and edges."""
-    low, high = ends
-    found, said, files, tables, y = None, [], {}, [], axis.name
-    title = f"{subject.name} over speed and {y}"
-    document = {"x": "speed", "y": y, "x_range": (low * RPM, high * RPM), "y_range": (axis.lower, axis.upper)}
-    if count is not None:
-        grid = {"speed": np.linspace(low, high, count[0])}, {y: np.linspace(axis.lower, axis.upper, count[1])}
-        found = jc.label_map(subject.model, *grid, **settings, stage=report)
-        jc.show.require_some(found)
-        labels, files["data"] = counted(found), found
-        document |= {"points": count, "labels": labels, "exponents": jc.show.top_exponent(found)}
-        tables.append(jc.show.shares_table(f"Points of {title}", "label", labels))
-        said.append(f"most points are {max(labels, key=labels.__getitem__)}")
+    """Answer on a map over speeds [rad/s] and a parameter: simulated points, with edges that are followed on top."""
+    y, title = axis.name, f"{subject.name} over speed and {axis.name}"
+    grid = {"speed": np.linspace(*ends, points[0])}, {y: np.linspace(axis.lower, axis.upper, points[1])}
+    found = jc.label_map(subject.model, *grid, **settings, stage=report)
+    jc.show.require_some(found)
     curves, lost = jc.show.follow_edges(subject.model, edges, ends, axis, settings.get("method"), report)
+    files = {"figure": jc.show.map_figure(axis, curves, found, title), "data": found}
+    labels, tables = counted(found), []
+    document = {"x": "speed", "y": y, "x_range": tuple(x * RPM for x in ends), "y_range": (axis.lower, axis.upper)}
+    document |= {"points": points, "labels": labels, "exponents": jc.show.top_exponent(found)}
+    said = f"Over speed and {y} most points are {max(labels, key=labels.__getitem__)}"
     if curves:
-        tables.insert(0, jc.show.curves_table(f"Edges of {title}", curves, axis))
+        tables.append(jc.show.curves_table(f"Edges of {title}", curves, axis))
         files["curve_data"] = jc.show.curve_columns(curves, axis)
-        said.insert(0, f"{jc.show.counted(len(curves), 'edge')} followed")
-    files["figure"] = jc.show.map_figure(axis, curves, found, title)
-    notes = [f"Not followed: {edge} ({why})" for edge, why in (refused | lost).items()]
-    said = f"Over speed and {y}: {', '.join(said) or 'no edge could be followed'}."
-    return Answer(said, tables, notes, document, files, part=f"_speed_{y}")
+        said += f"; {jc.show.counted(len(curves), 'edge')} followed"
+    tables.append(jc.show.shares_table(f"Points of {title}", "label", labels))
+    notes = [f"Not followed: {edge} ({why})" for edge, why in ((refused or {}) | lost).items()]
+    return Answer(f"{said}.", tables, notes, document, files, part=f"_speed_{y}")

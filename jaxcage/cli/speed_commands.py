@@ -246,7 +246,6 @@ def runup(
     *,
     over: o.Range = o.Range(),
     rate: Annotated[float, o.number("be a rate above 0 rpm/s", lambda x: x > 0)] = 5000.0,
-    windows: o.OptionalCount = None,
     discard: o.OptionalZero = None,
     load: o.Load = None,
     steps: o.StepOptions = o.StepOptions(),
@@ -256,11 +255,10 @@ def runup(
 
     Args:
         rate: Speed gained per second [rpm/s], in the mean over the ramp, of the speed that bare numbers are.
-        windows: Parts into which each ramp is cut at least; each has an even number of revolutions.
         discard: Revolutions at the first speed before the ramp begins.
     """
     settle = subject.usual(100, 10) if discard is None else discard
-    given = {"windows": windows or subject.usual(100, 24), "settle": settle, "method": steps.method}
+    given = {"windows": subject.usual(100, 24), "settle": settle, "method": steps.method}
     found = jc.lanes.ramp_up_down(subject.model, *subject.ends(over), subject.rate(rate), **given)
     spans, ways = jc.lanes.stretches_apart(found), {way: found.sel(way=way) for way in ("up", "down")}
     data = subject.speed_columns(ways["up"]["rpm"].values / RPM)
@@ -288,8 +286,6 @@ def study(
     sample: o.FromZero = 0,
     seed: o.Seed = 0,
     initial_states: o.OptionalCount = None,
-    exponents: o.OptionalCount = None,
-    chunk: o.OptionalCount = None,
     shard: o.Shard = None,
     run: o.RunOptions = o.RunOptions(),
     show: o.ShowOptions = o.ShowOptions(),
@@ -301,16 +297,14 @@ def study(
             oil=32,56,78 (ISO VG grades). Sampled: guidance_gap=0.3mm:0.6mm, or in a tolerance: eccentricity=20um±3um.
         sample: Number of samples, best a power of 2.
         initial_states: Initial states at each point; all of the model's own if left out.
-        exponents: Number of Lyapunov exponents.
-        chunk: Lanes computed and stored together.
         shard: Part of the work, e.g. 2/4: every fourth chunk from the second on. All parts write to the same store.
     """
     path = Path(show.out) / f"study_{subject.name}.zarr"
     given, done = read_vary(vary, subject), []
     if np.prod([max(sample, 1.0), *(float(x.size) for x in given.values() if isinstance(x, np.ndarray))]) > MOST_POINTS:
         raise InputError(f"Options --vary and --sample must make at most {MOST_POINTS} points to run lanes at.")
-    settings: dict[str, Any] = {"samples": sample, "seed": seed, "initial_states": initial_states, "lanes": chunk}
-    settings |= {"shard": shard or (1, 1)} | run.settings | ({} if exponents is None else {"exponents": exponents})
+    settings: dict[str, Any] = {"samples": sample, "seed": seed, "initial_states": initial_states}
+    settings |= {"shard": shard or (1, 1)} | run.settings
     advise("what is stored stays, and the same command goes on from there")
 
     def stored_so_far(lanes: int, total: int) -> None:

@@ -1,6 +1,7 @@
 """Reading of `NAME=VALUES` options into numbers: grids, single values, intervals and tolerances, with units."""
 
 import itertools
+import math
 import re
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -68,6 +69,23 @@ def no_worse_balance(model: Any, vary: dict[str, tuple[float, float]]) -> list[s
         )
     vary["eccentricity"] = lower, own
     return [f"Balance may only get better: eccentricity of at most {own * 1e6:g} um (--worse-balance lifts that)."]
+
+
+def read_prices(given: Sequence[str], usual: dict[str, float]) -> dict[str, float]:
+    """Read every `NAME=NUMBER`, and take the usual ones of the rest. **Raises:** `InputError`."""
+
+    def read(name: str, text: str) -> float:
+        if name not in usual:
+            raise InputError(f"Option --price must name one of {', '.join(usual)} here, but names '{name}'.")
+        value = read_quantity(text, "")
+        if not 0 <= value < math.inf:
+            raise ValueError(f"must be at least 0, but {value:g} was given.")
+        return value
+
+    found = usual | _read_each("--price", given, "NAME=NUMBER", read)
+    if len(found) > 1 and not sum(found.values()):
+        raise InputError("Option --price must not make all weights 0.")
+    return found
 
 
 def read_tolerances(text: str, subject: Subject, fastest: float) -> dict[str, Any]:

@@ -31,8 +31,8 @@ READINGS = {"clearance_reading": "radial clearance", "unbalance": "unbalance"}
 
 
 def sources_table(model: AbstractForcedSystem, file: BearingFile | None) -> Table:
-    """Table of the parameters of `model` in display units, with their ranges and sources, as given in a file, None for a
-    published case; constants and zeros that it does not give are left out."""
+    """Table of the parameters of `model` in display units, with their ranges and sources. Constants and zeros that the
+    file does not give are left out; None is the file of a published case."""
     rows, table, left = [], file and file.table, file.left if file else ()
     ranges = {name: each.range for each in (file.unknowns if file else ()) for name in each.names}
     short = {path: name for name, path in parameter_paths(model).items()}
