@@ -46,7 +46,8 @@ def init(
     written = write_template(path, model, short=not full)
     what = "an NU2310 with its rollers" if model == "bearing" else "the cage of an NU2310"
     said = f"Written: {written}. It describes {what}: change the values and go on, e.g. with"
-    commands = [f"  jaxcage {command} {path}" for command in ("statics", "sweep", "zones", "report")]
+    check = f'  jaxcage check {path} --operating "4000-14000 rpm shaft"'
+    commands = [check, *(f"  jaxcage {command} {path}" for command in ("statics", "sweep", "zones", "report"))]
     return Answer(said, notes=commands, document={"file": str(written)})
 
 

@@ -16,10 +16,11 @@ from jaxtyping import Array, Float
 from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
 from ..analysis import LONGEST_PERIOD, scatter
+from ..files import Range
 from ..models import AbstractForcedSystem, require_speeds
 from ..quantities import quantity
 from .dataset import CODES, coded, configuration_of, settings_of
-from .grid import LANES, Between, Grid
+from .grid import LANES, Grid
 from .observe import Progress
 from .plan import SPEED
 from .run import run_lanes
@@ -31,7 +32,7 @@ CLOSING = 2 * LONGEST_PERIOD
 """Number of strobe states kept, enough to detect the longest period."""
 
 
-Vary = Mapping[str, Float[Array, " values"] | Float[np.ndarray, " values"] | Between]
+Vary = Mapping[str, Float[Array, " values"] | Float[np.ndarray, " values"] | Range]
 """Mapping of parameter names, `"speed"` or `"oil"` to values [SI], an axis of the grid, or to a distribution."""
 Shard = tuple[int, int]
 """Part (i, n): the i-th of n parts, counted from 1."""
@@ -108,7 +109,7 @@ def study(
     **Arguments:**
 
     - `model`: a cage, a whole bearing or a system of your own.
-    - `vary`: parameters by name. Arrays are axes of a grid [SI]; all `jaxcage.lanes.Between` are sampled together. The
+    - `vary`: parameters by name. Arrays are axes of a grid [SI]; all `jaxcage.files.Range` are sampled together. The
         speed [rad/s], of the shaft for a whole bearing, must be among them; `oil` is the ISO VG grade of a mineral oil.
     - `store`: the folder.
     - `samples`, `seed`: number of samples (a scrambled Sobol sequence; preferably a power of 2) and seed.
@@ -125,7 +126,7 @@ def study(
     **Raises:** `ValueError` for arguments that do not fit together, and for a store of another study.
     """
     require_x64()
-    sampled: dict[str, Between] = {each: how for each, how in vary.items() if isinstance(how, Between)}
+    sampled: dict[str, Range] = {each: how for each, how in vary.items() if isinstance(how, Range)}
     axes = {each: np.asarray(x, dtype=float) for each, x in vary.items() if each not in sampled}
     own = len(model.initial_states(1.0)) if initial_states is None else initial_states
     most = lanes or (LANES if model.samples == 1 else LANES // 42)
