@@ -13,7 +13,7 @@ from . import options as o
 from .answer import Answer
 from .check_command import chances
 from .progress import report
-from .speed_commands import counted, said_of, swept, transient_notes
+from .speed_commands import counted, said_of, swept, zone_notes
 from .subject import RPM, Subject
 
 
@@ -50,11 +50,11 @@ def explained(
     known = jc.orbits.explain(jc.zones(found), orbits, subject.model, method)
     slopes = {} if quick else jc.show.edge_slopes(subject.model, loss, known, method)
     tables = [
-        *jc.show.motion_tables(name, found, known.zones, subject.published, beside),
-        jc.show.unstable_table(name, orbits, loss, subject.published, beside),
+        *jc.show.motion_tables(name, known.zones, beside),
+        jc.show.unstable_table(name, loss, beside),
         *([jc.show.elasticities_table(name, slopes, beside)] if slopes else []),
     ]
-    notes = [*transient_notes(subject, known.zones), *jc.show.source_notes(known), *jc.show.unsettled_notes(orbits)]
+    notes = [*zone_notes(subject, known.zones), *jc.show.source_notes(known), *jc.show.unsettled_notes(orbits)]
     said = said_of(subject, found, known.zones)
     return dataclasses.replace(answer, sentence=said, tables=tables, notes=notes), slopes
 
@@ -104,7 +104,7 @@ def of_orbits(subject: Subject, found: Any, loss: Any) -> Answer:
         "data": jc.show.branch_columns(found.branches),
     }
     tables = [
-        jc.show.unstable_table(name, found, loss, subject.published, beside),
+        jc.show.unstable_table(name, loss, beside),
         jc.show.stretch_table(name, found, beside),
         jc.show.edge_table(found, loss, beside),
     ]
@@ -176,8 +176,6 @@ def gradient(
     by_gap = f"1 % more guidance gap moves it by {slope.elasticity['guidance_gap']:+.2f} %"
     said = f"{edge.capitalize()}, at {slope.value_rpm:.0f} rpm, answers most to the gap: {by_gap}."
     notes = [f"Left out: {n}, {e.kind} ({e.status})." for n, e in edges.items() if not e.trusted]
-    residual = jc.show.residual_words(edges)
-    notes.append(f"Gradients against the scaling of units, largest relative residual: {residual}")
     return Answer(said, tables, notes, {}, {"figure": bars(subject, each)})
 
 

@@ -93,11 +93,9 @@ def sweep(
 
     A file with ranges gives chances of chaos.
     """
-    return (
-        chances(subject, subject.range(over, 40), draws, seed, run)
-        if subject.unknowns and draws
-        else swept(subject, subject.range(over, subject.usual(251, 13)), run)[1]
-    )
+    if subject.unknowns and draws:
+        return chances(subject, subject.range(over, 40), draws, seed, run)
+    return swept(subject, subject.range(over, subject.usual(251, 13)), run)[1]
 
 
 def swept(subject: Subject, speeds: Any, run: o.RunOptions) -> tuple[Any, Answer]:
@@ -110,20 +108,15 @@ def swept(subject: Subject, speeds: Any, run: o.RunOptions) -> tuple[Any, Answer
         say(f"Warning: {jc.show.counted(short, 'lane')} without a certain label{cure}.")
     if beyond := int(np.sum(found["peak"].values > 1)) * (not subject.with_rollers):
         say(f"Warning: {jc.show.counted(beyond, 'lane')} went beyond eps = 1, where the surfaces would overlap.")
-    tables = jc.show.motion_tables(subject.name, found, zones, subject.published, subject.beside)
+    tables = jc.show.motion_tables(subject.name, zones, subject.beside)
     if names := [n for n in SHOWN if n in found]:
         tables.append(jc.show.quantities_table(f"Means over initial states, {title}", found, [*names, "exponent"]))
     document = {name: found.attrs[name] for name in ("discard", "revolutions", "horizon")}
-    document |= {
-        "speeds": speeds.size,
-        "initial_states": found.sizes["initial_state"],
-        "labels": counted(found),
-        "too_short": short,
-    }
+    document |= {"speeds": speeds.size, "initial_states": found.sizes["initial_state"], "labels": counted(found)}
     document |= {"failed": jc.analysis.outcomes(found), "confirmed": json.loads(found.attrs["confirmed"])}
-    document["error"] = float(np.nanmax(found["error"].values))
+    document |= {"too_short": short, "error": float(np.nanmax(found["error"].values))}
     files = {"figure": jc.show.sweep_figure(found, zones, subject.published, title), "data": found}
-    said, notes = said_of(subject, found, zones), transient_notes(subject, zones)
+    said, notes = said_of(subject, found, zones), zone_notes(subject, zones)
     return found, Answer(said, tables, notes, document, files, details=[jc.summary(found)])
 
 
@@ -144,20 +137,21 @@ def said_of(subject: Subject, found: Any, zones: Any) -> str:
     between = f"between {rpm[0]:.0f} and {rpm[-1]:.0f} rpm" if rpm.size > 1 else f"at {rpm[0]:.0f} rpm"
     between = f"{between} of the {whose}"
     if "strobe" not in found:
-        chaotic = sum(zone.speeds for zone in zones if zone.chaotic)
-        each = (f"{' or '.join(z.labels)} {z.low_rpm:.0f} to {z.high_rpm:.0f} rpm" for z in zones)
-        of = jc.show.counted(rpm.size, "speed")
-        said = f"The largest exponent is positive beyond doubt at {chaotic} of {of} {between}"
-        return f"{said}; motion: {', '.join(each)}."
+        each = (f"{jc.show.motion_words(z.labels)} {z.low_rpm:.0f} to {z.high_rpm:.0f} rpm" for z in zones)
+        return f"Motion of the cage {between}: {', '.join(each)}."
     each = ", ".join(jc.show.zone_words(zone, subject.beside) for zone in zones.zones)
     lasts = f", in which chaos lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
     count = jc.show.counted(len(zones.zones), "chaotic zone") if zones.zones else "No chaotic zone"
     return f"{count} {between}{each and f': {each}'}{lasts if each else ''}."
 
 
-def transient_notes(subject: Subject, zones: Any) -> list[str]:
-    """The ranges of chaos that dies out, in a sentence."""
-    each = ", ".join(jc.show.zone_words(zone, subject.beside) for zone in getattr(zones, "transient", ()))
+def zone_notes(subject: Subject, zones: Any) -> list[str]:
+    """The ranges of chaos that dies out, in a sentence; of a bearing with its rollers what its exponent means."""
+    if subject.with_rollers:
+        chaotic, speeds = (sum(zone.speeds for zone in some) for some in ([z for z in zones if z.chaotic], zones))
+        said = f"The largest exponent of the whole bearing is positive beyond doubt at {chaotic} of {speeds} speeds"
+        return [f"{said}: that is the rollers in their pockets, and no rattle of the cage"]
+    each = ", ".join(jc.show.zone_words(zone, subject.beside) for zone in zones.transient)
     return [f"Transient chaos, with a mean life below {zones.horizon} revolutions: {each}"] if each else []
 
 
@@ -220,7 +214,7 @@ def compare(
         designs[each.name] |= {f"{n}_error": error for n, (_, error) in own.items()}
         means.append({n: float(np.nanmean(mean)) for n, (mean, _) in own.items()})
         said.append(f"{each.name}: {said_of(each, data, zones_of(data))}")
-        tables += jc.show.motion_tables(each.name, data, zones_of(data), each.published, each.beside)
+        tables += jc.show.motion_tables(each.name, zones_of(data), each.beside)
     rows = [{"measure": n.replace("_", " "), **{x: m[n] for x, m in zip(names, means, strict=True)}} for n in means[0]]
     tables = [
         jc.show.table("Means over speed, in SI units", rows, ["measure", *names], "means"),

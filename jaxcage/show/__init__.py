@@ -81,7 +81,6 @@ from .parameter_tables import (
     sources_table as sources_table,
 )
 from .quantity_tables import (
-    column_of as column_of,
     displacements as displacements,
     mean_over_starts as mean_over_starts,
     quantities_table as quantities_table,
@@ -102,7 +101,6 @@ from .slope_tables import (
     gradient_table as gradient_table,
     lasting_table as lasting_table,
     mean_gradient_tables as mean_gradient_tables,
-    residual_words as residual_words,
     source_notes as source_notes,
     to_be_turned as to_be_turned,
     width_table as width_table,
@@ -121,6 +119,7 @@ from .verdict_tables import (
     minimum_load_notes as minimum_load_notes,
     motion_sentence as motion_sentence,
     motion_table as motion_table,
+    motion_words as motion_words,
     range_sentence as range_sentence,
 )
 from .zone_tables import (

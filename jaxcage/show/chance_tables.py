@@ -11,10 +11,6 @@ from ..files import Measurement, Range
 from .tables import SHOWN, Beside, Column, Table, chosen, factor, speed_columns, table
 
 
-WORDS = {"calm as computed": "calm where computed", "chaotic as computed": "chaotic where computed"}
-"""Text of verdicts that are shown in other words."""
-
-
 def chances_document(found: Ensemble) -> dict[str, Any]:
     """Chances of chaos by speed for a JSON document."""
     names = ("chance_lower", "chance_upper", "chaotic_draws", "finished_draws")
@@ -32,7 +28,7 @@ def chances_table(name: str, found: Ensemble, beside: Beside = None) -> Table:
         part = list(places)
         known = found.chance[part][np.isfinite(found.chance[part])]
         row = {"from": float(found.rpm[part[0]]), "to": float(found.rpm[part[-1]]), "failed draws": span(lost[part])}
-        row |= {"verdict": WORDS.get(verdict, verdict), "chance": span(100 * known, " %") if known.size else None}
+        row |= {"verdict": verdict, "chance": span(100 * known, " %") if known.size else None}
         rows.append(row | {"95 % bars": span(100 * np.concatenate([low[part], high[part]]), " %")})
     columns = [column for end in ("from", "to") for column in speed_columns(end, end, beside)]
     columns += ["verdict", "chance", "95 % bars", *(["failed draws"] if np.any(lost) else [])]

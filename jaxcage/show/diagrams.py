@@ -20,6 +20,7 @@ from ..bearing import PublishedCase
 from ..quantities import quantity
 from . import style
 from .quantity_tables import column_of, mean_over_starts
+from .verdict_tables import motion_words
 from .zone_tables import zone_span
 
 
@@ -83,8 +84,7 @@ def shade_zones(ax: Axes, zones: Zones | Sequence[Stretch]) -> Axes:
         shaded = [("chaotic zone", style.ZONE, 1.0, zone_span(zone, low, high)) for zone in zones.zones]
     else:
         colour_of = lambda labels: style.MOTION_COLOURS.get("".join(labels), style.GREY)
-        motion = lambda labels: " or ".join(labels).replace("_", " ")
-        shaded = [(motion(s.labels), colour_of(s.labels), 0.1, (s.low_rpm, s.high_rpm)) for s in zones]
+        shaded = [(motion_words(s.labels), colour_of(s.labels), 0.1, (s.low_rpm, s.high_rpm)) for s in zones]
     drawn: set[str] = set()
     for label, colour, alpha, (first, last) in shaded:
         name = f"_{label}" if label in drawn else label

@@ -24,6 +24,7 @@ from .diagrams import label_speed, reported
 from .orbit_figures import chosen_pieces, mark_of
 from .quantity_tables import column_of
 from .tables import Column, Table, table
+from .verdict_tables import motion_words
 
 
 SPEED = "speed"
@@ -207,5 +208,5 @@ def _colour_labels(ax: Axes, x: np.ndarray, y: np.ndarray, labels: np.ndarray) -
     ax.pcolormesh(x, y, image)
     ax.set_title("Label (grey: the start decides, or failed)", fontsize=10, loc="left")
     met = [name for name in known if np.any(kinds == name)]
-    patches: list[Any] = [Patch(color=pale(known[name]), label=name.replace("_", " ")) for name in met]
+    patches: list[Any] = [Patch(color=pale(known[name]), label=motion_words([name])) for name in met]
     ax.legend(handles=patches, fontsize=8, loc="upper right")

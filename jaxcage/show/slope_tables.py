@@ -80,12 +80,6 @@ def gradient_table(name: str, model: AbstractForcedSystem, slope: Sensitivity) -
     return table(title, rows, ["parameter", "value", "SI unit", *columns])
 
 
-def residual_words(edges: Mapping[str, Sensitivity]) -> str:
-    """Largest residual of the trusted gradients in a test by scaling of units, as text."""
-    residuals = [abs(r) for e in edges.values() if e.trusted for r in e.homogeneity.values()]
-    return f"{max(residuals):.0e}" if residuals else "none is to be trusted"
-
-
 def source_notes(explained: Explained) -> list[str]:
     """Notes on the edges of chaotic zones that coincide with a bifurcation or the limit of a cascade."""
     edges = [e for zone in explained.zones.zones for e in (zone.onset, zone.exit) if e is not None]

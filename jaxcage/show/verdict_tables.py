@@ -115,6 +115,11 @@ MOTION_WORDS = {
 """Meaning of each motion."""
 
 
+def motion_words(labels: Sequence[str]) -> str:
+    """Plain words for motions."""
+    return " or ".join(MOTIONS.get(label, label) for label in labels)
+
+
 def cage_verdict(found: xr.Dataset) -> str:
     """Verdict over all speeds and initial states: `calm`, `circling`, `rattles` or `rattles in part`; `not decided` if
     simulations failed and none of the others rattles."""
