@@ -100,25 +100,6 @@ def test_bad_arguments(
     assert not any(path.is_file() for path in tmp_path.rglob("*"))
 
 
-@pytest.mark.parametrize(
-    "text, said",
-    [
-        ("guidance_gap = ", "must be valid TOML"),
-        ("base = '9'", "`base` must be one of"),
-        ("base = '1a'\n[film]\nwidth = 4e-3", "Key `width` in [film] is unknown (did you mean `land_width`?)."),
-        ("base = '1a'\nguidance_gap = '0.45 m'", 'but is 0.45 m (given as "0.45 m")'),
-        ("base = '1a'\nguidance_gap = '0.45 smoots'", '"smoots"'),
-        ("base = '1a'\nguidance_gap = nan", "but is nan m"),
-        ("base = '1a'\neccentricity = '0.5 mm'", "but is 0.5 mm in a gap of 0.45 mm"),
-    ],
-)
-def test_bad_configurations(capsys: pytest.CaptureFixture[str], tmp_path: Path, text: str, said: str):
-    path = tmp_path / "design.toml"
-    path.write_text(text)
-    sentence = refused(capsys, "sweep", str(path), "--out", str(tmp_path / "out"))
-    assert said in sentence and str(path) in sentence and not (tmp_path / "out").exists()
-
-
 @pytest.mark.wide
 @pytest.mark.parametrize("command", [name for name in COMMANDS if name != "init"])
 def test_nan_and_infinity_are_refused_in_every_option(

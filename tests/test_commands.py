@@ -47,20 +47,8 @@ def test_poincare(capsys: pytest.CaptureFixture[str], tmp_path: Path):
 
 
 def test_simulate(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    found = document(
-        capsys,
-        "simulate",
-        "1a",
-        "--speed",
-        "15000",
-        "--revolutions",
-        "3",
-        "--discard",
-        "0",
-        *RK4,
-        "--out",
-        str(tmp_path),
-    )
+    asked = "simulate 1a --speed 15000 --revolutions 3 --discard 0".split()
+    found = document(capsys, *asked, *RK4, "--out", str(tmp_path))
     assert found["outcome"] == "successful" and found["measures"]["drag_power"] > 0 and is_png(found["figure"])
     columns, mass = read_columns(found["data"]), float(jc.case("1a").cage_mass)
     assert columns["time [s]"].size == 3 * 128
@@ -209,18 +197,8 @@ def test_map_of_labels(capsys: pytest.CaptureFixture[str], tmp_path: Path):
 
 @pytest.mark.wide
 def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    asked = [
-        "study",
-        "1a",
-        "--vary",
-        "speed=9000:12000rpm:6",
-        "--vary",
-        "guidance_gap=0.4mm:0.5mm:2",
-        "--initial-states",
-        "2",
-    ]
-    asked += ["--discard", "10", "--revolutions", "20", "--solver", "rk4", "--steps", "128"]
-    asked += ["--out", str(tmp_path)]
+    asked = "study 1a --vary speed=9000:12000rpm:6 --vary guidance_gap=0.4mm:0.5mm:2 --initial-states 2".split()
+    asked += "--discard 10 --revolutions 20 --solver rk4 --steps 128".split() + ["--out", str(tmp_path)]
     whole = document(capsys, *asked, "--shard", "1/2")  # 24 lanes are one chunk
     assert whole["axes"] == {"speed": 6, "guidance_gap": 2, "initial_state": 2}
     assert (whole["lanes"], whole["stored"], whole["stored_before"]) == (24, 24, 0)

@@ -76,18 +76,7 @@ def test_zones_map_and_runup(capsys: pytest.CaptureFixture[str], tmp_path: pathl
 @pytest.mark.wide
 def test_gradient(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     names = ("guidance_gap", "cage_mass+cage_inertia")
-    asked = [
-        "gradient",
-        "nu2310",
-        "--speed",
-        "10000 rpm shaft",
-        "--load",
-        "1 kN",
-        "--designs",
-        "10",
-        "--initial-states",
-        "1",
-    ]
+    asked = "gradient nu2310 --speed 10000rpm --load 1kN --designs 10 --initial-states 1".split()
     asked += ["--by", *names, "--discard", "1", "--revolutions", "2"]
     found = document(capsys, *asked, "--out", str(tmp_path))
     model = jc.replace(jc.whole_bearing("nu2310"), load=1000.0)
@@ -116,17 +105,8 @@ def test_design(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
 
 @pytest.mark.wide
 def test_study(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
-    asked = [
-        "study",
-        "nu2310",
-        "--vary",
-        "speed=9000rpm,5000 rpm cage",
-        "--vary",
-        "load=1kN:2kN:2",
-        "--initial-states",
-        "1",
-    ]
-    asked += ["--discard", "1", "--revolutions", "10", "--out", str(tmp_path)]
+    asked = ["study", "nu2310", "--vary", "speed=9000rpm,5000 rpm cage", "--vary", "load=1kN:2kN:2"]
+    asked += "--initial-states 1 --discard 1 --revolutions 10 --out".split() + [str(tmp_path)]
     found = document(capsys, *asked)
     assert found["axes"] == {"speed": 2, "load": 2, "initial_state": 1} and sum(found["labels"].values()) == 4
     stored = jc.open_study(found["store"])
