@@ -70,29 +70,19 @@ def statics(
     found = jc.bearing.load_distribution(bearing, force, bearing.roller_centrifugal_force(shaft))
     title = f"{subject.name} at {force:g} N, {f'shaft at {shaft * RPM:g} rpm' if shaft else 'at rest'}"
     loads = np.asarray(found.inner_loads)
-    heads = {"angle": "rad", "inner load": "N", "outer load": "N"}
-    data = dict(zip(heads, map(np.asarray, (found.roller_angles, loads, found.outer_loads)), strict=True))
-    rollers = [
-        {name.replace(" ", "_"): float(x) for name, x in zip(data, row, strict=True)}
-        for row in zip(*data.values(), strict=True)
-    ]
-    columns = [jc.show.Column(name, name.replace(" ", "_"), unit, digits=1) for name, unit in heads.items()]
-    tables = [
-        jc.show.statics_table(f"Statics of {title}", model, found, shaft or None),
-        jc.show.table("Rollers", rollers, columns, "rollers", detail=True),
-    ]
-    document: dict[str, Any] = {
-        n: float(getattr(found, n)) for n in ("max_load", "shaft_shift", "elastic_approach", "half_angle")
-    }
-    viscosity = float(model.lubricant.kinematic_viscosity)
-    document |= {"load": force, "shaft_speed_rpm": shaft * RPM, "kinematic_viscosity": viscosity}
-    document["cage_displacement"] = jc.show.displacements(model, found)
-    kinematics = {name: float(getattr(bearing, name)(shaft)) for name in ("cage_speed", "roller_centrifugal_force")}
-    document["kinematics"] = {"cage_speed_ratio": float(bearing.cage_speed_ratio), **kinematics}
     said = f"{np.sum(loads > 0)} of {loads.size} rollers carry {force:g} N, the most loaded one {np.max(loads):.0f} N."
-    figure = jc.show.drawn(partial(jc.show.load_bars, found), 7.0, 3.8, title)
-    files = {"figure": figure, "data": {f"{name} [{heads[name]}]": x for name, x in data.items()}}
-    return Answer(said, tables, jc.show.minimum_load_notes(bearing, force, shaft * RPM), document, files)
+    document: dict[str, Any] = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
+    document |= {
+        "load": force,
+        "shaft_speed_rpm": shaft * RPM,
+        "cage_displacement": jc.show.displacements(model, found),
+    }
+    document["kinematic_viscosity"] = model.lubricant.kinematic_viscosity
+    document["kinematics"] = {"cage_speed_ratio": bearing.cage_speed_ratio, "cage_speed": bearing.cage_speed(shaft)}
+    columns = {"angle [rad]": found.roller_angles, "inner load [N]": loads, "outer load [N]": found.outer_loads}
+    files = {"figure": jc.show.drawn(partial(jc.show.load_bars, found), 7.0, 3.8, title), "data": columns}
+    table = jc.show.statics_table(f"Statics of {title}", model, found, shaft or None)
+    return Answer(said, [table], jc.show.minimum_load_notes(bearing, force, shaft * RPM), document, files)
 
 
 def report(

@@ -32,8 +32,6 @@ COMPARED = (
 """Variables that are compared, of those that a data set has."""
 RAMPED = ("size", "eccentricity", "cage_slip", "friction_power_W")
 """Variables of a ramp in its figure, of those that a data set has."""
-MOST_POINTS = 30_000_000
-"""Points of a study, each from several initial states: a week at a rate of 150 lanes a second."""
 
 
 def simulate(
@@ -168,23 +166,20 @@ def poincare(
     settings: dict[str, Any] = run.settings | {"keep": run.revolutions, "progress": partial(report, "sweep")}
     found = jc.sweep(subject.model, np.array([at]), **settings)
     jc.show.require_some(found, f" at {subject.at(at)}")
-    initial_states = []
-    for i, lane in enumerate(found.isel(speed=0).transpose("initial_state", ...)["strobe"]):
-        row = {name: str(found[name].values[0, i]) for name in ("label", "outcome")} | {"initial_state": i + 1}
-        row |= {name: float(found[name].values[0, i, 0]) for name in ("exponents", "standard_error")}
-        initial_states.append(row | {name: lane.sel(component=name).values for name in ("y_C", "vy_C")})
+    lanes, names = found.isel(speed=0, exponent=0), ("label", "outcome", "exponents", "standard_error")
+    each = range(found.sizes["initial_state"])
+    rows = [{"initial_state": i + 1} | {name: lanes[name].values[i].item() for name in names} for i in each]
     exponent = jc.show.Column("largest exponent per revolution", "exponents", error="standard_error")
-    title, names = (
+    title, starts = (
         f"{subject.name}, {subject.at(at)}",
-        [f"start {row['initial_state']}: {row['label']}" for row in initial_states],
+        [f"start {row['initial_state']}: {row['label']}" for row in rows],
     )
-    figure = jc.show.drawn(lambda ax: jc.show.strobe_section(found["strobe"].values[0], ax, names), 6.5, 5.4, title)
+    draw = partial(jc.show.strobe_section, found["strobe"].values[0], names=starts)
+    files = {"figure": jc.show.drawn(draw, 6.5, 5.4, title), "data": jc.show.strobe_columns(found)}
     title = f"Strobe section of {title}, {jc.analysis.length(found)}"
-    tables = [jc.show.table(title, initial_states, ["initial_state", "label", exponent], "initial_states")]
-    files, said = {"figure": figure, "data": jc.show.strobe_columns(found)}, " or ".join(counted(found))
-    return Answer(
-        f"At {subject.at(at)} the motion is {said}.", tables, [], subject.both(at), files, part=f"_{speed:g}rpm"
-    )
+    tables = [jc.show.table(title, rows, ["initial_state", "label", exponent], "initial_states")]
+    said = f"At {subject.at(at)} the motion is {' or '.join(counted(found))}."
+    return Answer(said, tables, [], subject.both(at), files, part=f"_{speed:g}rpm")
 
 
 def compare(
@@ -209,8 +204,7 @@ def compare(
         jc.show.require_some(data, f" of {each.name}")
         found.append(data := _measured(each, data))
         own = {n: jc.show.mean_over_starts(data, n) for n in COMPARED if n == "exponent" or n in data}
-        designs[each.name] = {"labels": data["label"].values, **each.both(data["speed"].values)}
-        designs[each.name] |= {n: mean for n, (mean, _) in own.items()}
+        designs[each.name] = each.both(data["speed"].values) | {n: mean for n, (mean, _) in own.items()}
         designs[each.name] |= {f"{n}_error": error for n, (_, error) in own.items()}
         means.append({n: float(np.nanmean(mean)) for n, (mean, _) in own.items()})
         said.append(f"{each.name}: {said_of(each, data, zones_of(data))}")
@@ -295,8 +289,6 @@ def study(
     """
     path = Path(show.out) / f"study_{subject.name}.zarr"
     given, done = read_vary(vary, subject), []
-    if np.prod([max(sample, 1.0), *(float(x.size) for x in given.values() if isinstance(x, np.ndarray))]) > MOST_POINTS:
-        raise InputError(f"Options --vary and --sample must make at most {MOST_POINTS} points to run lanes at.")
     settings: dict[str, Any] = {"samples": sample, "seed": seed, "initial_states": initial_states}
     settings |= {"shard": shard or (1, 1)} | run.settings
     advise("what is stored stays, and the same command goes on from there")
@@ -321,8 +313,6 @@ def study(
     jc.show.require_some(lanes.isel(lane=np.flatnonzero(lanes["label"].values != "pending")))
     document = {"axes": dict(zip(dims, found["label"].shape, strict=True)), "lanes": size, "labels": counts}
     document |= {"stored": size - left, "stored_before": size - left - done[-1] + done[0]}
-    means = {q.name: found[q.name].values for q in subject.model.quantities if q.name in found}
-    document["least_median_most"] = {name: np.nanpercentile(x, (0, 50, 100)) for name, x in means.items()}
     shape = " x ".join(f"{n} {axis}" for axis, n in document["axes"].items())
     said = f"{size - left} of {size} lanes are stored; {max(counts, key=counts.__getitem__)} is most common."
     tables, opened = [jc.show.shares_table(f"Lanes: {shape}", "label", counts)], f"jaxcage.open_study({str(path)!r})"
