@@ -15,7 +15,7 @@ import jaxcage as jc
 from .._errors import InputError
 from . import options as o
 from .answer import Answer
-from .check_command import chances, check
+from .check_command import at_best_guess, chances, check
 from .orbit_commands import bars, explained, gradient, mapped, of_orbits
 from .progress import report as tell, visible
 from .speed_commands import simulate, swept
@@ -115,22 +115,16 @@ def report(
         answer, slopes = explained(subject, found, orbits, answer, quick, run.method)
         parts += [("Zones", answer), *_of_orbits(subject, (low, high), orbits, slopes, quick, run.method)]
     if subject.unknowns:  # all but the first part
-        guess = lambda each: dataclasses.replace(each, sentence=f"At the best guess: {each.sentence}")
+        guess = lambda each: dataclasses.replace(each, sentence=at_best_guess(each.sentence))
         parts = [*parts[:1], *((f"{title} at the best guess", guess(each)) for title, each in parts[1:])]
     if float(getattr(subject.model, "load", 0.0)) > 0:
         fastest = None if at is None else jc.files.SpeedOf(at[1] * RPM, subject.own)
         parts.append(("Statics", statics(subject, speed=fastest)))
-    sections = [
-        *(_section(*part) for part in parts),
-        jc.show.Section(
-            "The design", tables=[jc.show.sources_table(subject.model, subject.file)], notes=subject.about(False)[1][:1]
-        ),
-        jc.show.Section(
-            "How it was computed",
-            tables=[jc.show.settings_table(found, time.perf_counter() - began)],
-            notes=[jc.show.PAPER],
-        ),
-    ]
+    design = jc.show.sources_table(subject.model, subject.file)
+    made = jc.show.settings_table(found, time.perf_counter() - began)
+    sections = [_section(*part) for part in parts]
+    sections.append(jc.show.Section("The design", tables=[design], notes=subject.about(False)[1][:1]))
+    sections.append(jc.show.Section("How it was computed", tables=[made], notes=[jc.show.PAPER]))
     command = visible(shlex.join([*words, *(["--quick"] if quick else [])]))
     subtitle = f"Cylindrical roller bearing, {subject.over(low, high)}"
     title = f"{'Case ' * (subject.published is not None)}{name}"

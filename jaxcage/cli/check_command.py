@@ -36,7 +36,7 @@ def check(
     margins = d.margins(subject.model, ends)
     margin = jc.show.margin_sentence(margins, *(subject.beside or (subject.own, 1.0)))
     if subject.unknowns and not isinstance(margins, str):
-        margin = f"At the best guess: {margin}"
+        margin = at_best_guess(margin)
     say(f"Preliminary: {margin}")
     tables = [] if isinstance(margins, str) else [jc.show.margins_table(margins, subject.beside)]
     if not isinstance(margins, str) and margins.changes:
@@ -53,6 +53,11 @@ def check(
     document = {"operating_rpm": [end * RPM for end in ends], **found.document}
     said, notes = f"{found.sentence} {margin}", [*found.notes, model]
     return dataclasses.replace(found, sentence=said, tables=tables, notes=notes, document=document)
+
+
+def at_best_guess(said: str) -> str:
+    """Sentence about the best guess of values that are known within ranges only."""
+    return f"At the best guess {said[:1].lower()}{said[1:]}"
 
 
 def chances(subject: Subject, speeds: Any, draws: int, seed: int, run: o.RunOptions = o.RunOptions()) -> Answer:
