@@ -79,7 +79,8 @@ def statics(
     }
     document["kinematic_viscosity"] = model.lubricant.kinematic_viscosity
     document["kinematics"] = {"cage_speed_ratio": bearing.cage_speed_ratio, "cage_speed": bearing.cage_speed(shaft)}
-    columns = {"angle [rad]": found.roller_angles, "inner load [N]": loads, "outer load [N]": found.outer_loads}
+    arrays = {"angle [rad]": found.roller_angles, "inner load [N]": loads, "outer load [N]": found.outer_loads}
+    columns = {head: np.asarray(x) for head, x in arrays.items()}
     files = {"figure": jc.show.drawn(partial(jc.show.load_bars, found), 7.0, 3.8, title), "data": columns}
     table = jc.show.statics_table(f"Statics of {title}", model, found, shaft or None)
     return Answer(said, [table], jc.show.minimum_load_notes(bearing, force, shaft * RPM), document, files)
