@@ -69,7 +69,7 @@ def test_zones_map_and_runup(capsys: pytest.CaptureFixture[str], tmp_path: pathl
     each = jc.sweep(models, jc.rpm(8000, 10000, 2), initial_states=1, discard=0, revolutions=2, blocks=2)
     power = load(mapped["data"])["friction_power_W"].isel(initial_state=0)
     np.testing.assert_allclose(power, each["friction_power_W"].isel(initial_state=0).T, rtol=0.05)
-    ramped = document(capsys, "runup", *RANGE[:-2], "--rate", "5000", *out)
+    ramped = document(capsys, "runup", *RANGE[:-2], "--rate", "2400", *out)
     assert len(ramped["up"]["cage_slip"]) >= 2 and is_png(mapped["figure"]) and is_png(ramped["figure"])
 
 
