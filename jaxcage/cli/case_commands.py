@@ -120,7 +120,7 @@ def report(
         parts = [*parts[:1], *((f"{title} at the best guess", guess(each)) for title, each in parts[1:])]
     if float(getattr(subject.model, "load", 0.0)) > 0:
         fastest = None if at is None else jc.files.SpeedOf(at[1] * RPM, subject.own)
-        parts.append(("Statics", statics(subject, speed=fastest)))
+        parts.append(("Statics", dataclasses.replace(statics(subject, speed=fastest), notes=())))
     design = jc.show.sources_table(subject.model, subject.file)
     made = jc.show.settings_table(found, time.perf_counter() - began)
     sections = [_section(*part) for part in parts]
