@@ -11,7 +11,7 @@ import jaxcage as jc
 from .._errors import NoResult
 from . import options as o
 from .answer import Answer
-from .progress import report, say
+from .progress import report_lanes, say
 from .subject import RPM, Subject
 
 
@@ -32,7 +32,7 @@ def check(
     subject, ends = subject.operating(operating)
     if subject.with_rollers:
         return _with_rollers(subject, ends)
-    d, over = jc.design, subject.over(*ends)
+    d = jc.design
     margins = d.margins(subject.model, ends)
     margin = jc.show.margin_sentence(margins, *(subject.beside or (subject.own, 1.0)))
     if subject.unknowns and not isinstance(margins, str):
@@ -46,7 +46,8 @@ def check(
         by_speed, *decide = found.tables
         tables += [*decide, dataclasses.replace(by_speed, detail=True)]
     else:
-        checked = d.check_design(subject.model, ends, progress=report)
+        checked = d.check_design(subject.model, ends, progress=report_lanes)
+        over = subject.over(*checked.speeds_rpm[[0, -1]] / RPM)
         document = {"verdict": "calm" if checked.calm else "not calm", "checked": checked}
         found = Answer(jc.show.range_sentence(over, None, checked), notes=[f"Checked: {checked}"], document=document)
     model = 'The cage model prescribes the impacts of the rollers; slip and forces: a file with model = "bearing"'
@@ -66,11 +67,12 @@ def chances(subject: Subject, speeds: Any, draws: int, seed: int, run: o.RunOpti
     d, most = jc.design, jc.design.REVOLUTIONS
     length: dict[str, Any] = {name: min(getattr(run, name) or most, most) for name in ("discard", "revolutions")}
     length |= {"blocks": o.blocks_of(length["revolutions"]), "draws": draws, "seed": seed, "method": run.method}
-    found = d.ensemble(subject.model, subject.unknowns, speeds, **length, progress=partial(report, "draws"))
+    found = d.ensemble(subject.model, subject.unknowns, speeds, **length, progress=partial(report_lanes, "draws"))
     if found.failed.all():
         raise NoResult(f"All {found.failed.size} simulations failed: try more steps (--steps), or narrower ranges.")
     chance, *outcomes = d.range_chance(found, found.rpm[0], found.rpm[-1])
-    rows, over = d.indices(found, *outcomes), subject.over(speeds[0], speeds[-1])
+    draws = len(found.place)
+    rows, over = d.indices(found, *outcomes), subject.over(*found.speed[[0, -1]])
     columns = subject.speed_columns(found.speed)
     columns |= dict(zip(("chance of chaos", "lower", "upper"), (found.chance, *found.interval), strict=True))
     title = f"{subject.name}: chaotic share of {draws} draws, at each speed alone"
@@ -90,12 +92,15 @@ def chances(subject: Subject, speeds: Any, draws: int, seed: int, run: o.RunOpti
 
 def _with_rollers(subject: Subject, ends: tuple[float, float]) -> Answer:
     """The verdict for a bearing with its rollers: the motion of its cage, its slip, and the makers' minimum load."""
-    found = jc.sweep(subject.model, np.linspace(*ends, SPEEDS), **LENGTH, progress=partial(report, "simulations"))
+    found = jc.sweep(subject.model, np.linspace(*ends, SPEEDS), **LENGTH, progress=partial(report_lanes, "simulations"))
     jc.show.require_some(found)
     notes = jc.show.minimum_load_notes(subject.model.bearing, float(subject.model.load), ends[1] * RPM)
     notes += [f"{jc.show.MOTIONS[name]}: {words}" for name, words in jc.show.MOTION_WORDS.items()]
     notes.append("The motion is that of the cage: rollers that rattle in their pockets do not count")
-    notes.append(f"{SPEEDS} speeds, {found.sizes['initial_state']} initial states, {jc.analysis.length(found)}")
+    notes.append(
+        f"{found.sizes['speed']} speeds, {found.sizes['initial_state']} initial states, {jc.analysis.length(found)}"
+    )
     document = {"operating_rpm": [end * RPM for end in ends], "verdict": jc.show.cage_verdict(found)}
+    over = subject.over(*found["speed"].values[[0, -1]])
     table = jc.show.motion_table(f"Motion of the cage of {subject.name}", found)
-    return Answer(jc.show.motion_sentence(subject.over(*ends), found), [table], notes, document)
+    return Answer(jc.show.motion_sentence(over, found), [table], notes, document)
