@@ -10,6 +10,10 @@ class InputError(ValueError):
     """Invalid input; the message names what was given and what is allowed."""
 
 
+class ConfigError(InputError):
+    """A configuration that is refused; the message is one sentence that names the key and what it may be."""
+
+
 class ArgumentError(InputError):
     """Invalid arguments, by name: shown as `name` for a function and as --name for an option of the command."""
 

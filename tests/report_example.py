@@ -101,8 +101,8 @@ def sections(name: str = "1a") -> list[Section]:
     }
     captions = {key: (figure, f"Figure about {key} of a design") for key, figure in figures.items()}
     beside = ("shaft", 1 / RATIO)
-    tables = motion_tables(name, sweep, known, PUBLISHED_CASES["1a"], beside)
-    tables.append(unstable_table(name, found, unstable_ranges(found), None, beside))
+    tables = motion_tables(name, known, beside)
+    tables.append(unstable_table(name, unstable_ranges(found), beside))
     return [
         Section("Zones", ["2 zones of chaos."], captions, tables),
         Section("Settings", tables=[settings_table(sweep, 1.0)]),

@@ -44,6 +44,11 @@ WRONG = {
     'eccentricity = "G6.3 at 200 Hz shaft"': 'such as "G6.3 at 12000 rpm shaft", but is in Hz',
     'guidance = "inner"': 'Key `guidance` at the top level needs model = "bearing".',
     'bearing.designation = "6204"': "`bearing.designation` must be one of NU1010, NU1014,",
+    'bearing.pocket_clearance = "4 mm"': "which are 19.57 mm apart, but makes them 20 mm wide.",
+    'eccentricity = "0.5 mm"': "`eccentricity` must be smaller than `guidance_gap`, but is 0.5 mm in a gap of 0.45 mm.",
+    'eccentricity = "G6300 at 1200 rpm cage"': 'but is 0.0501338 m (given as "G6300 at 1200 rpm cage").',
+    'bearing.bore = "70 mm"': "`bearing.bore` must be below the inner raceway, 65 mm, but is 70 mm.",
+    'film.land_width = "8 mm"': "`film.land_width` must fit beside the rollers, in 6.5 mm, but is 8 mm.",
 }
 REFUSALS = """
 import sys, time
@@ -125,7 +130,7 @@ def test_what_is_estimated_of_a_catalogue_bearing_is_named(tmp_path: Path):
     names = "radial_clearance", "effective_length", *rollers
     file = read_bearing(path)
     assert file.estimated == tuple(f"bearing.{name}" for name in names)
-    rows = jc.show.sources_table(file.model, file.table, file.left).records
+    rows = jc.show.sources_table(file.model, file).records
     found = {row["name"].removeprefix("bearing."): row["from"] for row in rows if row["name"].startswith("bearing.")}
     assert {name for name, source in found.items() if source == "estimated for the catalogue"} == {*names}
     assert (found["bore"], found["pocket_clearance"]) == ("catalogue, NU1020", "this file")

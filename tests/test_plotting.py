@@ -185,7 +185,7 @@ def test_curves_and_exponents_share_their_axes():
     values = {"label": (axes, label), "exponents": ((*axes, "exponent"), largest[..., None, None])}
     found = xr.Dataset(values, {"speed": rpm * PER_RPM, "guidance_gap": gap})
     axis = Axis("guidance_gap", 4e-4, 6e-4, "m")
-    ax = stability_map(axis, two_curves(), found=found)
+    ax = stability_map(axis, two_curves(), found)
     np.testing.assert_allclose(points(ax, "Neimark-Sacker")[[0, -1]], [[10000, 0.5], [10900, 0.42]])
     assert ax.get_ylabel() == "Guidance gap [mm]"
     (mesh,) = [c for c in ax.collections if isinstance(c, QuadMesh)]
@@ -196,7 +196,7 @@ def test_curves_and_exponents_share_their_axes():
     assert min(mesh.cmap(mesh.norm(0.0))[:3]) > 0.95 and red[0] > red[2] and blue[2] > blue[0]
     assert ax.get_xlim() == pytest.approx((8750, 11250)) and ax.get_ylim() == pytest.approx((0.35, 0.65))
     with pytest.raises(ValueError, match="guidance_gap over speed, but load"):
-        stability_map(axis, [*two_curves(), curve_of("fold", np.ones(2), np.ones(2), "load")])
+        stability_map(axis, [*two_curves(), curve_of("fold", np.ones(2), np.ones(2), "load")], found)
 
 
 # Colours: G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, IEEE Trans. Vis. Comput. Graph. 15 (2009) 1291.

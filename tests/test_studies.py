@@ -18,7 +18,8 @@ import xarray as xr
 from scipy import stats
 
 import jaxcage as jc
-from jaxcage.lanes import Between, Grid
+from jaxcage.files import Range
+from jaxcage.lanes import Grid
 
 
 class Duffing(eqx.Module):
@@ -38,7 +39,7 @@ OSCILLATOR = jc.ForcedOscillator(Duffing(jnp.array(0.1), jnp.array(1.0)), coordi
 SPEEDS, CUBICS = np.linspace(1.1, 1.9, 9), np.array([0.5, 1.0, 1.5, -4.0])
 LENGTH: dict[str, Any] = {"discard": 40, "revolutions": 40, "blocks": 4, "method": jc.method("rodas4", steps=32)}
 OPTIONS: dict[str, Any] = {**LENGTH, "initial_states": 2, "lanes": 12, "name": "duffing", "version": "1"}
-VARY: dict[str, Any] = {"cubic": CUBICS, "speed": SPEEDS, "damping": Between(0.08, 0.12, normal=True)}
+VARY: dict[str, Any] = {"cubic": CUBICS, "speed": SPEEDS, "damping": Range(0.08, 0.12, is_normal=True)}
 
 
 def duffing_study(store: Path, **more: Any) -> xr.Dataset:
@@ -150,7 +151,7 @@ def test_samples_fill_their_distributions():
     """A Sobol sequence has one point in each of n equal parts, of every parameter; a tolerance is a normal distribution
     cut off at three standard deviations."""
     speed = {"speed": np.ones(1)}
-    sampled = {"a": Between(2.0, 6.0), "b": Between(9.7, 10.3, normal=True)}
+    sampled = {"a": Range(2.0, 6.0), "b": Range(9.7, 10.3, is_normal=True)}
     first, again, other = (Grid(speed, sampled, 256, seed, 1).cloud for seed in (0, 0, 1))
     assert all(np.array_equal(first[name], again[name]) for name in sampled)
     assert not np.array_equal(first["a"], other["a"])

@@ -1,13 +1,14 @@
-"""The verdict for an operating range."""
+"""The verdict for an operating range, and chances of chaos of a file with ranges."""
 
+import dataclasses
 from functools import partial
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import tyro
 
 import jaxcage as jc
 
+from .._errors import NoResult
 from . import options as o
 from .answer import Answer
 from .progress import report_lanes, say
@@ -17,54 +18,84 @@ from .subject import RPM, Subject
 SPEEDS = 9
 """Speeds at which a bearing with its rollers is simulated."""
 LENGTH: dict[str, Any] = {"initial_states": 2, "discard": 30, "revolutions": 20, "blocks": 4, "exponents": 0}
-Operating = Annotated[str, o.text(), tyro.conf.arg(help='Range of speed of the machine, e.g. "4000-14000 rpm shaft".')]
 
 
 def check(
     subject: o.Case,
     *,
-    operating: Operating,
+    operating: o.Operating,
     draws: o.Draws = 64,
     seed: o.Seed = 0,
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
     """Does the cage stay calm over an operating range, with what probability and margin, and what to change first."""
-    ends, d = subject.operating(operating), jc.design
+    subject, ends = subject.operating(operating)
     if subject.with_rollers:
         return _with_rollers(subject, ends)
-    ratio, whose = (1.0, subject.own) if subject.shaft is None else (subject.shaft, "shaft")
-    over = lambda rpm: f"{ratio * rpm[0]:.0f} to {ratio * rpm[-1]:.0f} rpm of the {whose}"
+    d = jc.design
     margins = d.margins(subject.model, ends)
-    margin = jc.show.margin_sentence(margins, whose, ratio)
+    margin = jc.show.margin_sentence(margins, *(subject.beside or (subject.own, 1.0)))
+    if subject.unknowns and not isinstance(margins, str):
+        margin = at_best_guess(margin)
     say(f"Preliminary: {margin}")
-    document: dict[str, Any] = {"operating_rpm": [end * RPM for end in ends]}
-    if subject.unknowns and draws:
-        speeds, told = np.linspace(*ends, d.RANGE_SPEEDS), partial(report_lanes, "draws")
-        drawn = d.ensemble(subject.model, subject.unknowns, speeds, draws=draws, seed=seed, progress=told)
-        chance, *outcomes = d.range_chance(drawn, ends[0] * RPM, ends[1] * RPM)
-        rows = d.indices(drawn, *outcomes)
-        said, note = jc.show.range_sentence(over(drawn.rpm), chance, None), jc.show.indices_note(rows)
-        document |= {"verdict": chance.state, "calm_share": chance.share, "calm_interval": chance.interval}
-        document |= {"draws": chance.draws, "chaotic_draws": chance.chaotic, "known_draws": chance.known}
-        decide = [jc.show.indices_table(rows)] if rows and rows[0].telling else []
-    else:
-        checked = d.check_design(subject.model, ends, progress=report_lanes)
-        said, note, decide = jc.show.range_sentence(over(checked.speeds_rpm), None, checked), f"Checked: {checked}", []
-        document |= {"verdict": "calm" if checked.calm else "not calm", "checked": checked}
-    table, largest = forces(subject, ends)
     tables = [] if isinstance(margins, str) else [jc.show.margins_table(margins, subject.beside)]
     if not isinstance(margins, str) and margins.changes:
         tables.append(jc.show.changes_table(subject.model, margins))
+    if subject.unknowns and draws:
+        found = chances(subject, np.linspace(*ends, d.RANGE_SPEEDS), draws, seed)
+        by_speed, *decide = found.tables
+        tables += [*decide, dataclasses.replace(by_speed, detail=True)]
+    else:
+        checked = d.check_design(subject.model, ends, progress=report_lanes)
+        over = subject.over(*checked.speeds_rpm[[0, -1]] / RPM)
+        document = {"verdict": "calm" if checked.calm else "not calm", "checked": checked}
+        found = Answer(jc.show.range_sentence(over, None, checked), notes=[f"Checked: {checked}"], document=document)
     model = 'The cage model prescribes the impacts of the rollers; slip and forces: a file with model = "bearing"'
-    notes, by_ranges = [largest, note, model], "draws" in document
-    return Answer(f"{said} {margin}", [*tables, *decide, table], notes, document, by_ranges=by_ranges)
+    document = {"operating_rpm": [end * RPM for end in ends], **found.document}
+    table, largest = _forces(subject, ends)
+    said, notes = f"{found.sentence} {margin}", [largest, *found.notes, model]
+    return dataclasses.replace(found, sentence=said, tables=[*tables, table], notes=notes, document=document)
 
 
-def forces(subject: Subject, ends: tuple[float, float]) -> tuple[Any, str]:
+def _forces(subject: Subject, ends: tuple[float, float]) -> tuple[Any, str]:
     """Table of the forces on the cage at both ends of a range of its speed [rad/s], and a note on the largest."""
-    ratio, whose = (1.0, subject.own) if subject.shaft is None else (subject.shaft, "shaft")
+    whose, ratio = subject.beside or (subject.own, 1.0)
     found = {f"{ratio * end * RPM:.0f} rpm {whose}": jc.analysis.largest_forces(subject.model, end) for end in ends}
     return jc.show.forces_table(found), jc.show.forces_note(found, [u.label for u in subject.unknowns])
+
+
+def at_best_guess(said: str) -> str:
+    """Sentence about the best guess of values that are known within ranges only."""
+    return f"At the best guess {said[:1].lower()}{said[1:]}"
+
+
+def chances(subject: Subject, speeds: Any, draws: int, seed: int, run: o.RunOptions = o.RunOptions()) -> Answer:
+    """How likely a cage with unknown values is calm at all speeds [rad/s], and what would decide it; first of the
+    tables is the one by speed. Draws run for at most 100 revolutions after 100."""
+    d, most = jc.design, jc.design.REVOLUTIONS
+    length: dict[str, Any] = {name: min(getattr(run, name) or most, most) for name in ("discard", "revolutions")}
+    length |= {"blocks": o.blocks_of(length["revolutions"]), "draws": draws, "seed": seed, "method": run.method}
+    found = d.ensemble(subject.model, subject.unknowns, speeds, **length, progress=partial(report_lanes, "draws"))
+    if found.failed.all():
+        raise NoResult(f"All {found.failed.size} simulations failed: try more steps (--steps), or narrower ranges.")
+    chance, *outcomes = d.range_chance(found, found.rpm[0], found.rpm[-1])
+    draws = len(found.place)
+    rows, over = d.indices(found, *outcomes), subject.over(*found.speed[[0, -1]])
+    columns = subject.speed_columns(found.speed)
+    columns |= dict(zip(("chance of chaos", "lower", "upper"), (found.chance, *found.interval), strict=True))
+    title = f"{subject.name}: chaotic share of {draws} draws, at each speed alone"
+    figure = jc.show.drawn(partial(jc.show.chance_of_chaos, found), title=title)
+    tables = [jc.show.chances_table(subject.name, found, subject.beside)]
+    tables += [jc.show.indices_table(rows)] if rows and rows[0].telling else []
+    document = {"verdict": chance.state, "calm_share": chance.share, "calm_interval": chance.interval}
+    document |= {
+        "chaotic_draws": chance.chaotic,
+        "known_draws": chance.known,
+        "by_speed": jc.show.chances_document(found),
+    }
+    notes, files = [jc.show.indices_note(rows), *jc.show.chances_notes(found)], {"figure": figure, "data": columns}
+    said = jc.show.range_sentence(over, chance, None)
+    return Answer(said, tables, notes, document, files, jc.show.unknowns_notes(found), by_ranges=True)
 
 
 def _with_rollers(subject: Subject, ends: tuple[float, float]) -> Answer:
@@ -78,7 +109,6 @@ def _with_rollers(subject: Subject, ends: tuple[float, float]) -> Answer:
         f"{found.sizes['speed']} speeds, {found.sizes['initial_state']} initial states, {jc.analysis.length(found)}"
     )
     document = {"operating_rpm": [end * RPM for end in ends], "verdict": jc.show.cage_verdict(found)}
-    rpm = found["rpm"].values
-    over = f"{rpm[0]:.0f} to {rpm[-1]:.0f} rpm of the {subject.own}"
+    over = subject.over(*found["speed"].values[[0, -1]])
     table = jc.show.motion_table(f"Motion of the cage of {subject.name}", found)
     return Answer(jc.show.motion_sentence(over, found), [table], notes, document)

@@ -15,11 +15,13 @@ from .answer import Answer
 from .orbit_commands import bars
 from .progress import report
 from .subject import RPM, Subject
-from .values import no_worse_balance, read_bounds, read_tolerances
+from .values import no_worse_balance, read_bounds, read_prices, read_tolerances
 
 
 DESIGNED = o.Range(4000.0, 27500.0)
 """Speeds at which designs of a cage are assessed, 48 of them by default."""
+WEIGHED = "wear", "force", "impulse", "power", "slip", "balance"
+"""Prices of a bearing with its rollers."""
 Vary = Annotated[
     o.Texts,
     tyro.conf.arg(
@@ -38,18 +40,10 @@ def design(
     *,
     vary: Vary = (),
     over: o.Range = DESIGNED,
-    cost: o.Price = None,
-    wear: o.Price = None,
-    force: o.Price = None,
-    impulse: o.Price = None,
-    power: o.Price = None,
-    slip: o.Price = None,
-    balance: o.Price = None,
+    price: o.Prices = (),
     worse_balance: bool = False,
     search: o.OptionalText = None,
-    searches: o.FromOne = 1,
     steps: o.OptionalCount = None,
-    batch: o.OptionalCount = None,
     seed: o.Seed = 0,
     calm: o.CalmOptions = o.CalmOptions(),
     means: o.MeanOptions = o.MeanOptions(),
@@ -61,18 +55,11 @@ def design(
     losses; its best design is compared with the given one by independent runs.
 
     Args:
-        cost: Price of a unit of manufacturing cost of a cage [rpm of chaotic speeds]; by default 1000.
-        wear: For a bearing: weight of the wear over its present value; by default 1, as for all weights.
-        force: For a bearing: weight of the peak forces on pockets and land.
-        impulse: For a bearing: weight of the impulses of pockets and land.
-        power: For a bearing: weight of the power lost.
-        slip: For a bearing: weight of the slip of its cage.
-        balance: For a bearing: weight of the balance grade of its cage.
+        price: For surrogate, once each: cost of a cage, 1000 rpm of chaotic speeds by default; of a bearing the weights
+            of wear, force, impulse, power, slip and balance over their present values, 1 by default.
         worse_balance: Let the cage be balanced worse than it is.
         search: Search for a design: slsqp or augmented with --operating, else surrogate, on simulations.
-        searches: With --operating: number of searches, the first from the design itself.
         steps: For surrogate: steps of the search; by default 10, for a bearing 12.
-        batch: For surrogate: designs of a step; by default 12, for a bearing 16.
     """
     d, model, bounds = jc.design, subject.model, read_bounds(vary, subject)
     notes = [] if worse_balance else no_worse_balance(model, bounds)
@@ -85,23 +72,18 @@ def design(
             raise InputError(f"Option --operating {orbits}, but {subject.name} is a bearing.")
         if calm.operating is None:
             raise InputError(f"Option --search {search} goes with --operating.")
-        return _calm_design(subject, bounds, calm, notes, search=search, searches=searches, seed=seed)
-    given = {"wear": wear, "force": force, "impulse": impulse, "power": power, "slip": slip, "balance": balance}
-    prices = {name: 1.0 if price is None else price for name, price in given.items()}
-    if subject.with_rollers and not sum(prices.values()):
-        raise InputError(f"Options {', '.join(f'--{name}' for name in prices)} must not all be 0.")
-    if wrong := [name for name, price in given.items() if price is not None and not subject.with_rollers]:
-        raise InputError(f"Option --{wrong[0]} goes with a bearing with its rollers, but {subject.name} is a cage.")
+        return _calm_design(subject, bounds, calm, notes, search=search, seed=seed)
+    prices = read_prices(price, subject.usual({"cost": 1e3}, dict.fromkeys(WEIGHED, 1.0)))
     runs = _runs(subject, over, means, seed)
     if subject.with_rollers:
         objective, compared = d.bearing_objective(model, runs, prices), {}
     else:
-        prices, ends = {"cost": 1e3 if cost is None else cost}, (runs.speed[0] * RPM, runs.speed[-1] * RPM)
+        ends = runs.speed[0] * RPM, runs.speed[-1] * RPM
         objective = d.chaotic_width(*ends, price=prices["cost"])
         compared = {"chaotic speeds": d.chaotic_width(*ends)}
     names = subject.usual((d.BALANCE, *d.LAND_LOADS), d.COMPARED)
     compared |= {name: d.statistic(model, name) for name in names} | {d.OBJECTIVE: objective}
-    length = {"batches": steps or subject.usual(10, 12), "batch": batch or subject.usual(12, 16)}
+    length = {"batches": steps or subject.usual(10, 12), "batch": subject.usual(12, 16)}
     values, finer = objective.values(runs), objective.values(runs.fresh(1, initial_states=4))
     told = {"confirm": finer, "seed": seed, "report": partial(report, "search")}
     found = d.surrogate_search(model, bounds, values, **length, **told)
@@ -141,11 +123,11 @@ def _calm_design(
 ) -> Answer:
     """Answer on the design of a cage for calm operation over a range of speed."""
     model, name = subject.model, subject.name
-    low, high = subject.operating(calm.operating or "")
+    subject, (low, high) = subject.operating(calm.operating)
     film = None if calm.least_film is None else jc.files.to_si(calm.least_film, "m")
     keep = jc.Requirements(calm.margin, calm.decay, film, calm.land_force, calm.grade, calm.drag)
     tolerance = read_tolerances(calm.tolerance or "", subject, high)
-    given: dict[str, Any] = {"objective": calm.objective, "tolerance": tolerance, "check": calm.check}
+    given: dict[str, Any] = {"objective": calm.objective, "tolerance": tolerance}
     best = jc.design_for(model, (low, high), bounds, keep, **given, **searches, progress=report)
     tables = [jc.show.changed_table(f"Design of {name}", model, best, bounds)]
     tables.append(jc.show.requirement_table("Requirements over the operating range", best, subject.beside))
@@ -161,7 +143,7 @@ def _calm_design(
     names = ("verdict", "checked", "cost", "cost_before", "prices", "conflict", "at_bound", "stopped_by")
     document = {"optimum": best.values, "vary": bounds} | {name: getattr(best, name) for name in names}
     document["operating_rpm"] = ends = low * RPM, high * RPM
-    said = _calm_sentence(best, f"{low * RPM:.0f} to {high * RPM:.0f} rpm of the {subject.own}", calm.objective)
+    said = _calm_sentence(best, subject.over(low, high), calm.objective)
     return Answer(said, tables, notes, document, {"figure": jc.show.calm_figure(best, ends, name)})
 
 
@@ -250,7 +232,6 @@ def identify(
     measured: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="CSV")],
     *,
     draws: Annotated[int, o.count(16)] = 128,
-    stages: o.FromOne = 4,
     seed: o.Seed = 0,
     steps: o.StepOptions = o.StepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
@@ -261,7 +242,6 @@ def identify(
         measured: Measurements: a file with the columns quantity, speed, value, tolerance; a quantity is
             `whirl frequency` [Hz], `orbit size` [mm], or without a value `rattles` or `calm`.
         draws: Number of draws from the ranges in each stage.
-        stages: Largest number of times that the ranges close around the best draws.
     """
     model, unknowns = subject.model, subject.unknowns
     if not unknowns:
@@ -270,7 +250,7 @@ def identify(
     rows = jc.files.read_measurements(measured, subject.speeds, 1 / (subject.shaft or 1.0))
     told = {"method": steps.method, "progress": partial(report, "draws")}
     missed = lambda place: jc.design.misses(model, unknowns, rows, place, **told)
-    found = jc.design.narrow(unknowns, missed, draws=draws, stages=stages, seed=seed)
+    found = jc.design.narrow(unknowns, missed, draws=draws, seed=seed)
     table, info = jc.show.measured_table(found, rows, subject.beside), jc.parameter_info(model)
     document = {name: getattr(found, name) for name in ("draws", "stages", "accepted")}
     if not found.accepted:

@@ -25,6 +25,8 @@ LARGEST = {"rpm": 1e6, "N": 1e7}
 SIDE = range(2, 10_001)
 """Allowed numbers of points along one side of a map."""
 EXAMPLES = {"rpm": '"900 rad/s" or "20000 rpm shaft"', "N": '"4.45 kN"'}
+TO = re.compile(r"\s*(?:-|–|\bto\b)\s*")
+"""Separates the ends of a range of speed."""
 
 
 def flag(name: str) -> str:
@@ -71,6 +73,24 @@ def read_quantity(given: str, unit: str) -> float:
         raise ValueError(f"must be a number in {unit}, or one with a unit such as {example}, but {error}.") from None
 
 
+def read_range(given: str) -> tuple[float, ...]:
+    """Read a range of speed [rpm] such as `4000-14000 rpm shaft` or `900 to 1500 rad/s`, with the owner of the speeds
+    if the text names one. **Raises:** `ValueError` whose message follows the option's name."""
+    from ..files import SpeedOf, split_owner, to_si
+
+    try:
+        part, whose = split_owner(given)
+        ends = TO.split(part, maxsplit=1)
+        units = [end.lstrip("0123456789.e ") for end in ends]
+        other = next(filter(None, units), "rpm")
+        found = [to_si(end if unit else f"{end} {other}", "rpm") for end, unit in zip(ends, units, strict=True)]
+    except ValueError as error:
+        raise ValueError(f'must be a range of speed such as "4000-14000 rpm shaft", but "{given}" {error}.') from None
+    if not (len(found) == 2 and 0 < found[0] < found[1] < math.inf):
+        raise ValueError(f'must be one range of speed above 0 that grows, but "{given}" was given.')
+    return tuple(found) if whose is None else tuple(SpeedOf(end, whose) for end in found)
+
+
 def number(must: str = "be finite", holds: Callable[[float], bool] = math.isfinite, unit: str = "") -> Any:
     """Option that takes a number, in `unit` or with its own unit, for which `holds` is true."""
     most = LARGEST.get(unit, math.inf)
@@ -113,6 +133,11 @@ else:  # a text, which the wrapper replaces by the subject before it runs the co
     Other = Annotated[tyro.conf.Positional[Any], text(metavar="OTHER"), arg(help="The design to compare it with.")]
 Speed = Annotated[float, _SPEED, arg(help=f'Speed, e.g. "900 rad/s" or "20000 rpm shaft". {_OWN}.')]
 SpeedOrRest = Annotated[float | None, _SPEED, arg(help=f"Speed; at rest if left out. {_OWN}.")]
+Operating = Annotated[
+    Any,
+    text("name a range", read=read_range, metavar="RANGE"),
+    arg(help='Range of speed of the machine, e.g. "4000-14000 rpm shaft".'),
+]
 Load = Annotated[float | None, _LOAD, arg(help='Shaft load of a bearing with its rollers [N], e.g. "4.45 kN".')]
 Draws = Annotated[int, count(0), arg(help="Draws from ranges of the file; 0 takes the best guesses.")]
 Seed = Annotated[int, count(0), arg(help="Seed of all that is drawn.")]
@@ -123,8 +148,8 @@ FromTwo = Annotated[int, count(2)]
 OptionalCount = Annotated[int | None, count(1)]
 OptionalZero = Annotated[int | None, count(0)]
 OptionalText = Annotated[str | None, text()]
-Price = Annotated[float | None, _NOT_NEGATIVE]
 Texts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
+Prices = Annotated[Texts, arg(metavar="NAME=NUMBER")]
 Points = Annotated[tuple[int, int] | None, pair("x", _SIDES, lambda a, b: a in SIDE and b in SIDE)]
 Shard = Annotated[tuple[int, int] | None, pair("/", "be I/N with I from 1 to N, e.g. 1/4", lambda i, n: 1 <= i <= n)]
 
@@ -220,8 +245,7 @@ class MeanOptions:
 class CalmOptions:
     """Requirements on the design of a cage over an operating range."""
 
-    operating: OptionalText = None
-    """Operating range of speed, e.g. "31500-44000 rpm shaft"."""
+    operating: Operating = None
     objective: Annotated[str, text("be cost or width", lambda x: x in ("cost", "width"))] = "cost"
     """The quantity to minimise: cost, or the exact width of the unstable ranges within --operating."""
     margin: Annotated[float, number("be at least 0 and below 50", lambda x: 0 <= x < 50)] = 10.0
@@ -238,8 +262,6 @@ class CalmOptions:
     """Largest power lost by shear of the film [W]."""
     tolerance: OptionalText = None
     """Tolerances within which all of this must hold, e.g. "guidance_gap=+-0.05 mm, eccentricity=G6.3"."""
-    check: FromZero = 16
-    """Initial states from which the result is simulated over the range as a check; 0 leaves it out."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -11,8 +11,9 @@ import jaxcage as jc
 from .._errors import ArgumentError, InputError, NoResult
 from . import options as o
 from .answer import Answer
+from .check_command import chances
 from .progress import report
-from .speed_commands import chances, counted, said_of, swept, transient_notes
+from .speed_commands import counted, said_of, swept, zone_notes
 from .subject import RPM, Subject
 
 
@@ -32,7 +33,7 @@ def zones(
     For a bearing with its rollers: ranges of speed with the same motion. For a file with ranges: chances of chaos.
     """
     if subject.unknowns and draws:
-        return chances(subject, over, draws, seed, run)
+        return chances(subject, subject.range(over, 40), draws, seed, run)
     found, answer = swept(subject, subject.range(over, subject.usual(251, 13)), run)
     if subject.with_rollers:
         return answer
@@ -43,20 +44,19 @@ def zones(
 
 def explained(
     subject: Subject, found: Any, orbits: Any, answer: Answer, quick: bool, method: Any
-) -> tuple[Answer, Any, dict[str, Any]]:
-    """Answer on a sweep with the mechanisms of its zones and unstable ranges; chaotic zones; sensitivities of exact
-    edges."""
+) -> tuple[Answer, dict[str, Any]]:
+    """Answer on a sweep with the mechanisms of its zones and unstable ranges; sensitivities of exact edges."""
     name, beside, loss = subject.name, subject.beside, jc.unstable_ranges(orbits)
     known = jc.orbits.explain(jc.zones(found), orbits, subject.model, method)
     slopes = {} if quick else jc.show.edge_slopes(subject.model, loss, known, method)
     tables = [
-        *jc.show.motion_tables(name, found, known.zones, subject.published, beside),
-        jc.show.unstable_table(name, orbits, loss, subject.published, beside),
+        *jc.show.motion_tables(name, known.zones, beside),
+        jc.show.unstable_table(name, loss, beside),
         *([jc.show.elasticities_table(name, slopes, beside)] if slopes else []),
     ]
-    notes = [*transient_notes(subject, known.zones), *jc.show.source_notes(known), *jc.show.unsettled_notes(orbits)]
+    notes = [*zone_notes(subject, known.zones), *jc.show.source_notes(known), *jc.show.unsettled_notes(orbits)]
     said = said_of(subject, found, known.zones)
-    return dataclasses.replace(answer, sentence=said, tables=tables, notes=notes), known.zones, slopes
+    return dataclasses.replace(answer, sentence=said, tables=tables, notes=notes), slopes
 
 
 def _searched(subject: Subject, over: o.Range, discard: int | None, method: Any, purpose: str = "") -> tuple[Any, Any]:
@@ -104,18 +104,21 @@ def of_orbits(subject: Subject, found: Any, loss: Any) -> Answer:
         "data": jc.show.branch_columns(found.branches),
     }
     tables = [
-        jc.show.unstable_table(name, found, loss, subject.published, beside),
+        jc.show.unstable_table(name, loss, beside),
         jc.show.stretch_table(name, found, beside),
         jc.show.edge_table(found, loss, beside),
     ]
     notes = [
         *jc.show.coexisting_notes(loss),
         *jc.show.unsettled_notes(found),
-        f"Further bifurcations, on unstable parts: {len(found.points) - len(found.edges)} (listed by --json)",
-        f"Settled orbits that are on no branch: {found.missed}",
     ]
-    without = ", ".join(jc.show.zone_words(zone, beside) for zone in loss.zones) or "none"
-    said = f"The synchronous orbit is stable in {len(found.stretches)} ranges of speed; zones without it: {without}."
+    if further := len(found.points) - len(found.edges):
+        notes.append(f"Further bifurcations, on unstable parts: {further} (listed by --json)")
+    if found.missed:
+        notes.append(f"Settled orbits that are on no branch: {found.missed}")
+    without, count = ", ".join(jc.show.zone_words(zone, beside) for zone in loss.zones), len(found.stretches)
+    said = f"A synchronous orbit is stable at every speed{f' except {without}' if without else ''}."
+    said += f" It is in {count} pieces; at the end of one the cage goes over to another motion." if count > 1 else ""
     document = {"points": [jc.show.point_record(p, found) for p in found.points], "missed": found.missed}
     return Answer(said, tables, notes, document, files)
 
@@ -173,8 +176,6 @@ def gradient(
     by_gap = f"1 % more guidance gap moves it by {slope.elasticity['guidance_gap']:+.2f} %"
     said = f"{edge.capitalize()}, at {slope.value_rpm:.0f} rpm, answers most to the gap: {by_gap}."
     notes = [f"Left out: {n}, {e.kind} ({e.status})." for n, e in edges.items() if not e.trusted]
-    residual = jc.show.residual_words(edges)
-    notes.append(f"Gradients against the scaling of units, largest relative residual: {residual}")
     return Answer(said, tables, notes, {}, {"figure": bars(subject, each)})
 
 
@@ -253,8 +254,7 @@ def map_(
     points: o.Points = None,
     initial_states: o.FromOne = 1,
     persist: o.FromZero = 0,
-    no_points: bool = False,
-    no_curves: bool = False,
+    quick: o.Quick = False,
     run: o.RunOptions = o.RunOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
@@ -267,8 +267,7 @@ def map_(
         points: Grid of simulated points, e.g. 300x300.
         initial_states: Initial states at each point.
         persist: Revolutions that chaos must outlast to count.
-        no_points: Only follow the edges of the synchronous orbit.
-        no_curves: Do not follow the edges of the synchronous orbit.
+        quick: Do not follow the edges of the synchronous orbit.
     """
     model, y = subject.model, y or subject.usual("guidance_gap", "load")
     if y not in (info := jc.parameter_info(model)):
@@ -279,54 +278,45 @@ def map_(
             given |= {} if text is None else {end: jc.files.to_si(text, info[y].unit)}
         except ValueError as error:
             raise ArgumentError(end, said=f"{error}.") from error
-    axis, curves = jc.show.parameter_axis(model, y, **given), not (no_curves or subject.with_rollers)
-    edges, refused = {}, {}
-    if no_points:
-        subject.require_orbits("map --no-points")
+    axis, edges, refused = jc.show.parameter_axis(model, y, **given), {}, {}
     usual = subject.usual({"discard": 1000, "revolutions": 100, "blocks": 20}, {"discard": 20, "revolutions": 20})
     discard = usual["discard"] if run.discard is None else run.discard
     if 0 < persist <= discard:
         raise ArgumentError("persist", said=f"must be 0 or above the {discard} discarded, but is {persist}.")
-    if curves:
+    if not (quick or subject.with_rollers):
         try:
             edges = _searched(subject, over, discard, run.method, "follow")[1].edges
         except NoResult as error:
-            if no_points:
-                raise
             refused = {"edges": str(error).rstrip(".")}
     settings = usual | run.settings | {"initial_states": initial_states, "persist": persist}
-    count = None if no_points else points or subject.usual((50, 12), (13, 8))
-    return mapped(subject, subject.ends(over), axis, count, edges, refused, settings)
+    grid = points or subject.usual((50, 12), (13, 8))
+    return mapped(subject, subject.ends(over), axis, grid, edges, settings, refused)
 
 
 def mapped(
     subject: Subject,
     ends: tuple[float, float],
     axis: Any,
-    count: tuple[int, int] | None,
+    points: tuple[int, int],
     edges: dict[str, Any],
-    refused: dict[str, str],
     settings: dict[str, Any],
+    refused: dict[str, str] | None = None,
 ) -> Answer:
-    """Answer on a map over speeds [rad/s] and a parameter: simulated points, if any, and edges."""
-    low, high = ends
-    found, said, files, tables, y = None, [], {}, [], axis.name
-    title = f"{subject.name} over speed and {y}"
-    document = {"x": "speed", "y": y, "x_range": (low * RPM, high * RPM), "y_range": (axis.lower, axis.upper)}
-    if count is not None:
-        grid = {"speed": np.linspace(low, high, count[0])}, {y: np.linspace(axis.lower, axis.upper, count[1])}
-        found = jc.label_map(subject.model, *grid, **settings, stage=report)
-        jc.show.require_some(found)
-        labels, files["data"] = counted(found), found
-        document |= {"points": count, "labels": labels, "exponents": jc.show.top_exponent(found)}
-        tables.append(jc.show.shares_table(f"Points of {title}", "label", labels))
-        said.append(f"most points are {max(labels, key=labels.__getitem__)}")
+    """Answer on a map over speeds [rad/s] and a parameter: simulated points, with edges that are followed on top."""
+    y, title = axis.name, f"{subject.name} over speed and {axis.name}"
+    grid = {"speed": np.linspace(*ends, points[0])}, {y: np.linspace(axis.lower, axis.upper, points[1])}
+    found = jc.label_map(subject.model, *grid, **settings, stage=report)
+    jc.show.require_some(found)
     curves, lost = jc.show.follow_edges(subject.model, edges, ends, axis, settings.get("method"), report)
+    files = {"figure": jc.show.map_figure(axis, curves, found, title), "data": found}
+    labels, tables = counted(found), []
+    document = {"x": "speed", "y": y, "x_range": tuple(x * RPM for x in ends), "y_range": (axis.lower, axis.upper)}
+    document |= {"points": points, "labels": labels, "exponents": jc.show.top_exponent(found)}
+    said = f"Over speed and {y} most points are {max(labels, key=labels.__getitem__)}"
     if curves:
-        tables.insert(0, jc.show.curves_table(f"Edges of {title}", curves, axis))
+        tables.append(jc.show.curves_table(f"Edges of {title}", curves, axis))
         files["curve_data"] = jc.show.curve_columns(curves, axis)
-        said.insert(0, f"{jc.show.counted(len(curves), 'edge')} followed")
-    files["figure"] = jc.show.map_figure(axis, curves, found, title)
-    notes = [f"Not followed: {edge} ({why})" for edge, why in (refused | lost).items()]
-    said = f"Over speed and {y}: {', '.join(said) or 'no edge could be followed'}."
-    return Answer(said, tables, notes, document, files, part=f"_speed_{y}")
+        said += f"; {jc.show.counted(len(curves), 'edge')} followed"
+    tables.append(jc.show.shares_table(f"Points of {title}", "label", labels))
+    notes = [f"Not followed: {edge} ({why})" for edge, why in ((refused or {}) | lost).items()]
+    return Answer(f"{said}.", tables, notes, document, files, part=f"_speed_{y}")

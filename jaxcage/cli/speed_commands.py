@@ -16,6 +16,7 @@ import jaxcage as jc
 from .._errors import InputError, NoResult
 from . import options as o
 from .answer import Answer
+from .check_command import chances
 from .progress import advise, interrupted, report, report_lanes, say
 from .subject import RPM, Subject
 from .values import read_vary
@@ -32,8 +33,6 @@ COMPARED = (
 """Variables that are compared, of those that a data set has."""
 RAMPED = ("size", "eccentricity", "cage_slip", "friction_power_W")
 """Variables of a ramp in its figure, of those that a data set has."""
-MOST_POINTS = 30_000_000
-"""Points of a study, each from several initial states: a week at a rate of 150 lanes a second."""
 
 
 def simulate(
@@ -94,11 +93,9 @@ def sweep(
     A file with ranges gives chances of chaos. After Ctrl-C the answer is that of the finished speeds; a bearing with
     its rollers keeps them in --out, and the same command goes on from there.
     """
-    return (
-        chances(subject, over, draws, seed, run)
-        if subject.unknowns and draws
-        else swept(subject, subject.range(over, subject.usual(251, 13)), run, show.out)[1]
-    )
+    if subject.unknowns and draws:
+        return chances(subject, subject.range(over, 40), draws, seed, run)
+    return swept(subject, subject.range(over, subject.usual(251, 13)), run, show.out)[1]
 
 
 def swept(subject: Subject, speeds: Any, run: o.RunOptions, out: str | None = None) -> tuple[Any, Answer]:
@@ -120,7 +117,7 @@ def swept(subject: Subject, speeds: Any, run: o.RunOptions, out: str | None = No
         say(f"Warning: {jc.show.counted(short, 'lane')} without a certain label{cure}.")
     if beyond := int(np.sum(found["peak"].values > 1)) * (not subject.with_rollers):
         say(f"Warning: {jc.show.counted(beyond, 'lane')} went beyond eps = 1, where the surfaces would overlap.")
-    tables = jc.show.motion_tables(subject.name, found, zones, subject.published, subject.beside)
+    tables = jc.show.motion_tables(subject.name, zones, subject.beside)
     if names := [n for n in SHOWN if n in found]:
         tables.append(jc.show.quantities_table(f"Means over initial states, {title}", found, [*names, "exponent"]))
     document = {name: found.attrs[name] for name in ("discard", "revolutions", "horizon")}
@@ -128,12 +125,11 @@ def swept(subject: Subject, speeds: Any, run: o.RunOptions, out: str | None = No
         "speeds": found.sizes["speed"],
         "initial_states": found.sizes["initial_state"],
         "labels": counted(found),
-        "too_short": short,
     }
     document |= {"failed": jc.analysis.outcomes(found), "confirmed": json.loads(found.attrs["confirmed"])}
-    document["error"] = float(np.nanmax(found["error"].values))
+    document |= {"too_short": short, "error": float(np.nanmax(found["error"].values))}
     files = {"figure": jc.show.sweep_figure(found, zones, subject.published, title), "data": found}
-    said, notes = said_of(subject, found, zones), transient_notes(subject, zones)
+    said, notes = said_of(subject, found, zones), zone_notes(subject, zones)
     return found, Answer(said, tables, notes, document, files, details=[jc.summary(found)], kept=kept)
 
 
@@ -154,39 +150,22 @@ def said_of(subject: Subject, found: Any, zones: Any) -> str:
     between = f"between {rpm[0]:.0f} and {rpm[-1]:.0f} rpm" if rpm.size > 1 else f"at {rpm[0]:.0f} rpm"
     between = f"{between} of the {whose}"
     if "strobe" not in found:
-        chaotic = sum(zone.speeds for zone in zones if zone.chaotic)
-        each = (f"{' or '.join(z.labels)} {z.low_rpm:.0f} to {z.high_rpm:.0f} rpm" for z in zones)
-        of = jc.show.counted(rpm.size, "speed")
-        said = f"The largest exponent is positive beyond doubt at {chaotic} of {of} {between}"
-        return f"{said}; motion: {', '.join(each)}."
+        each = (f"{jc.show.motion_words(z.labels)} {z.low_rpm:.0f} to {z.high_rpm:.0f} rpm" for z in zones)
+        return f"Motion of the cage {between}: {', '.join(each)}."
     each = ", ".join(jc.show.zone_words(zone, subject.beside) for zone in zones.zones)
     lasts = f", in which chaos lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
     count = jc.show.counted(len(zones.zones), "chaotic zone") if zones.zones else "No chaotic zone"
     return f"{count} {between}{each and f': {each}'}{lasts if each else ''}."
 
 
-def transient_notes(subject: Subject, zones: Any) -> list[str]:
-    """The ranges of chaos that dies out, in a sentence."""
-    each = ", ".join(jc.show.zone_words(zone, subject.beside) for zone in getattr(zones, "transient", ()))
+def zone_notes(subject: Subject, zones: Any) -> list[str]:
+    """The ranges of chaos that dies out, in a sentence; of a bearing with its rollers what its exponent means."""
+    if subject.with_rollers:
+        chaotic, speeds = (sum(zone.speeds for zone in some) for some in ([z for z in zones if z.chaotic], zones))
+        said = f"The largest exponent of the whole bearing is positive beyond doubt at {chaotic} of {speeds} speeds"
+        return [f"{said}: that is the rollers in their pockets, and no rattle of the cage"]
+    each = ", ".join(jc.show.zone_words(zone, subject.beside) for zone in zones.transient)
     return [f"Transient chaos, with a mean life below {zones.horizon} revolutions: {each}"] if each else []
-
-
-def chances(subject: Subject, over: o.Range, draws: int, seed: int, run: o.RunOptions) -> Answer:
-    """Chances of chaos by speed, of a file with ranges: motions of draws, of at most 100 revolutions after 100."""
-    most = jc.design.REVOLUTIONS
-    length: dict[str, Any] = {name: min(getattr(run, name) or most, most) for name in ("discard", "revolutions")}
-    length |= {"blocks": o.blocks_of(length["revolutions"]), "draws": draws, "seed": seed, "method": run.method}
-    given = subject.model, subject.unknowns, subject.range(over, 40)
-    found = jc.design.ensemble(*given, **length, progress=partial(report_lanes, "draws"))
-    draws = len(found.place)
-    if found.failed.all():
-        raise NoResult(f"All {found.failed.size} simulations failed: try more steps (--steps), or narrower ranges.")
-    columns = subject.speed_columns(found.speed)
-    columns |= dict(zip(("chance of chaos", "lower", "upper"), (found.chance, *found.interval), strict=True))
-    figure = jc.show.drawn(partial(jc.show.chance_of_chaos, found), title=f"{subject.name}: {draws} draws")
-    tables, notes = jc.show.chances_tables(subject.name, found, subject.beside), jc.show.chances_notes(found)
-    document, files = jc.show.chances_document(found), {"figure": figure, "data": columns}
-    return Answer(jc.show.chances_answer(found), tables, notes, document, files, by_ranges=True)
 
 
 def poincare(
@@ -202,23 +181,20 @@ def poincare(
     settings: dict[str, Any] = run.settings | {"keep": run.revolutions, "progress": partial(report, "sweep")}
     found = jc.sweep(subject.model, np.array([at]), **settings)
     jc.show.require_some(found, f" at {subject.at(at)}")
-    initial_states = []
-    for i, lane in enumerate(found.isel(speed=0).transpose("initial_state", ...)["strobe"]):
-        row = {name: str(found[name].values[0, i]) for name in ("label", "outcome")} | {"initial_state": i + 1}
-        row |= {name: float(found[name].values[0, i, 0]) for name in ("exponents", "standard_error")}
-        initial_states.append(row | {name: lane.sel(component=name).values for name in ("y_C", "vy_C")})
+    lanes, names = found.isel(speed=0, exponent=0), ("label", "outcome", "exponents", "standard_error")
+    each = range(found.sizes["initial_state"])
+    rows = [{"initial_state": i + 1} | {name: lanes[name].values[i].item() for name in names} for i in each]
     exponent = jc.show.Column("largest exponent per revolution", "exponents", error="standard_error")
-    title, names = (
+    title, starts = (
         f"{subject.name}, {subject.at(at)}",
-        [f"start {row['initial_state']}: {row['label']}" for row in initial_states],
+        [f"start {row['initial_state']}: {row['label']}" for row in rows],
     )
-    figure = jc.show.drawn(lambda ax: jc.show.strobe_section(found["strobe"].values[0], ax, names), 6.5, 5.4, title)
+    draw = partial(jc.show.strobe_section, found["strobe"].values[0], names=starts)
+    files = {"figure": jc.show.drawn(draw, 6.5, 5.4, title), "data": jc.show.strobe_columns(found)}
     title = f"Strobe section of {title}, {jc.analysis.length(found)}"
-    tables = [jc.show.table(title, initial_states, ["initial_state", "label", exponent], "initial_states")]
-    files, said = {"figure": figure, "data": jc.show.strobe_columns(found)}, " or ".join(counted(found))
-    return Answer(
-        f"At {subject.at(at)} the motion is {said}.", tables, [], subject.both(at), files, part=f"_{speed:g}rpm"
-    )
+    tables = [jc.show.table(title, rows, ["initial_state", "label", exponent], "initial_states")]
+    said = f"At {subject.at(at)} the motion is {' or '.join(counted(found))}."
+    return Answer(said, tables, [], subject.both(at), files, part=f"_{speed:g}rpm")
 
 
 def compare(
@@ -243,12 +219,11 @@ def compare(
         jc.show.require_some(data, f" of {each.name}")
         found.append(data := _measured(each, data))
         own = {n: jc.show.mean_over_starts(data, n) for n in COMPARED if n == "exponent" or n in data}
-        designs[each.name] = {"labels": data["label"].values, **each.both(data["speed"].values)}
-        designs[each.name] |= {n: mean for n, (mean, _) in own.items()}
+        designs[each.name] = each.both(data["speed"].values) | {n: mean for n, (mean, _) in own.items()}
         designs[each.name] |= {f"{n}_error": error for n, (_, error) in own.items()}
         means.append({n: float(np.nanmean(mean)) for n, (mean, _) in own.items()})
         said.append(f"{each.name}: {said_of(each, data, zones_of(data))}")
-        tables += jc.show.motion_tables(each.name, data, zones_of(data), each.published, each.beside)
+        tables += jc.show.motion_tables(each.name, zones_of(data), each.beside)
     rows = [{"measure": n.replace("_", " "), **{x: m[n] for x, m in zip(names, means, strict=True)}} for n in means[0]]
     tables = [
         jc.show.table("Means over speed, in SI units", rows, ["measure", *names], "means"),
@@ -274,7 +249,6 @@ def runup(
     *,
     over: o.Range = o.Range(),
     rate: Annotated[float, o.number("be a rate above 0 rpm/s", lambda x: x > 0)] = 5000.0,
-    windows: o.OptionalCount = None,
     discard: o.OptionalZero = None,
     load: o.Load = None,
     steps: o.StepOptions = o.StepOptions(),
@@ -284,11 +258,10 @@ def runup(
 
     Args:
         rate: Speed gained per second [rpm/s], in the mean over the ramp, of the speed that bare numbers are.
-        windows: Parts into which each ramp is cut at least; each has an even number of revolutions.
         discard: Revolutions at the first speed before the ramp begins.
     """
     settle = subject.usual(100, 10) if discard is None else discard
-    given = {"windows": windows or subject.usual(100, 24), "settle": settle, "method": steps.method}
+    given = {"windows": subject.usual(100, 24), "settle": settle, "method": steps.method}
     found = jc.lanes.ramp_up_down(subject.model, *subject.ends(over), subject.rate(rate), **given)
     spans, ways = jc.lanes.stretches_apart(found), {way: found.sel(way=way) for way in ("up", "down")}
     data = subject.speed_columns(ways["up"]["rpm"].values / RPM)
@@ -316,8 +289,6 @@ def study(
     sample: o.FromZero = 0,
     seed: o.Seed = 0,
     initial_states: o.OptionalCount = None,
-    exponents: o.OptionalCount = None,
-    chunk: o.OptionalCount = None,
     shard: o.Shard = None,
     run: o.RunOptions = o.RunOptions(),
     show: o.ShowOptions = o.ShowOptions(),
@@ -329,16 +300,12 @@ def study(
             oil=32,56,78 (ISO VG grades). Sampled: guidance_gap=0.3mm:0.6mm, or in a tolerance: eccentricity=20um±3um.
         sample: Number of samples, best a power of 2.
         initial_states: Initial states at each point; all of the model's own if left out.
-        exponents: Number of Lyapunov exponents.
-        chunk: Lanes computed and stored together.
         shard: Part of the work, e.g. 2/4: every fourth chunk from the second on. All parts write to the same store.
     """
     path = Path(show.out) / f"study_{subject.name}.zarr"
     given, done = read_vary(vary, subject), []
-    if np.prod([max(sample, 1.0), *(float(x.size) for x in given.values() if isinstance(x, np.ndarray))]) > MOST_POINTS:
-        raise InputError(f"Options --vary and --sample must make at most {MOST_POINTS} points to run lanes at.")
-    settings: dict[str, Any] = {"samples": sample, "seed": seed, "initial_states": initial_states, "lanes": chunk}
-    settings |= {"shard": shard or (1, 1)} | run.settings | ({} if exponents is None else {"exponents": exponents})
+    settings: dict[str, Any] = {"samples": sample, "seed": seed, "initial_states": initial_states}
+    settings |= {"shard": shard or (1, 1)} | run.settings
     advise("what is stored stays, and the same command goes on from there")
 
     def stored_so_far(lanes: int, total: int) -> None:
@@ -363,8 +330,6 @@ def study(
     jc.show.require_some(lanes.isel(lane=np.flatnonzero(lanes["label"].values != "pending")))
     document = {"axes": dict(zip(dims, found["label"].shape, strict=True)), "lanes": size, "labels": counts}
     document |= {"stored": size - left, "stored_before": size - left - done[-1] + done[0]}
-    means = {q.name: found[q.name].values for q in subject.model.quantities if q.name in found}
-    document["least_median_most"] = {name: np.nanpercentile(x, (0, 50, 100)) for name, x in means.items()}
     shape = " x ".join(f"{n} {axis}" for axis, n in document["axes"].items())
     said = f"{size - left} of {size} lanes are stored; {max(counts, key=counts.__getitem__)} is most common."
     tables, opened = [jc.show.shares_table(f"Lanes: {shape}", "label", counts)], f"jaxcage.open_study({str(path)!r})"

@@ -34,6 +34,8 @@ class Subject:
     file: "BearingFile | None" = None
     path: str = ""
     """Path of the file as it was given."""
+    bare: Any = None
+    """Owner of speeds given as bare numbers, `cage` or `shaft`; None for that of the file or the model."""
 
     @property
     def own(self) -> Any:
@@ -43,7 +45,7 @@ class Subject:
     @property
     def speeds(self) -> Any:
         """Whose speeds bare numbers are."""
-        return self.own if self.file is None else self.file.speeds
+        return self.bare or (self.own if self.file is None else self.file.speeds)
 
     @property
     def unknowns(self) -> "tuple[Unknown, ...]":
@@ -72,6 +74,11 @@ class Subject:
     def beside(self) -> tuple[str, float] | None:
         """The speed that tables show in place of the model's, and its ratio to it; None for the model's."""
         return None if self.shaft is None or self.speeds == self.own else ("shaft", self.shaft)
+
+    def over(self, low: float, high: float) -> str:
+        """A range of the model's speed [rad/s] in words."""
+        whose, ratio = self.beside or (self.own, 1.0)
+        return f"{low * ratio * RPM:.0f} to {high * ratio * RPM:.0f} rpm of the {whose}"
 
     def both(self, speed: Any) -> dict[str, Any]:
         """Speeds of the model [rad/s] as speeds of cage and shaft [rpm], for a document."""
@@ -140,15 +147,11 @@ class Subject:
             raise InputError(f"Option --load goes with a bearing with its rollers, but {self.name} is a cage.")
         return self if load is None else dataclasses.replace(self, model=jc.replace(self.model, load=load))
 
-    def operating(self, given: str) -> tuple[float, float]:
-        """Ends of an operating range, as speeds of the model [rad/s].
-
-        **Raises:** `InputError` for anything but one range.
-        """
-        found = jc.show.read_operating(given, self.model, self.speeds)
-        if len(found) != 1 or found[0].low_rpm == found[0].high_rpm:
-            raise InputError(f"Option --operating must be one range of speed, but '{given}' was given.")
-        return found[0].low_rpm / RPM, found[0].high_rpm / RPM
+    def operating(self, given: tuple[float, ...]) -> tuple["Subject", tuple[float, float]]:
+        """The subject, whose speeds are shown as those of the owner that an operating range [rpm] names; and the ends
+        of the range as speeds of the model [rad/s]."""
+        low, high = (jc.rpm(self.rpm(end, "operating")) for end in given)
+        return dataclasses.replace(self, bare=getattr(given[0], "whose", self.speeds)), (low, high)
 
     def require_orbits(self, command: str) -> None:
         """**Raises:** `InputError` for a model whose revolutions do not repeat."""

@@ -1,6 +1,7 @@
 """Reading of `NAME=VALUES` options into numbers: grids, single values, intervals and tolerances, with units."""
 
 import itertools
+import math
 import re
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -44,7 +45,7 @@ def read_bounds(given: Sequence[str], subject: Subject) -> dict[str, tuple[float
 
     def read(name: str, text: str) -> Any:
         between = None if name in (SPEED, OIL) else _read(name, text, subject)
-        if not isinstance(between, jc.lanes.Between) or between.normal:
+        if not isinstance(between, jc.files.Range) or between.is_normal:
             raise ValueError(f"must be a parameter's NAME=LOWER:UPPER, but is {text}.")
         if names and name not in names:
             raise InputError(f"Option --vary must name one of {', '.join(names)}, but names '{name}'.")
@@ -52,7 +53,7 @@ def read_bounds(given: Sequence[str], subject: Subject) -> dict[str, tuple[float
 
     found = _read_each("--vary", given, "a parameter's NAME=LOWER:UPPER", read)
     _check_corners(found, subject)
-    return {name: between.bounds for name, between in found.items()}
+    return {name: (between.lower, between.upper) for name, between in found.items()}
 
 
 def no_worse_balance(model: Any, vary: dict[str, tuple[float, float]]) -> list[str]:
@@ -68,6 +69,23 @@ def no_worse_balance(model: Any, vary: dict[str, tuple[float, float]]) -> list[s
         )
     vary["eccentricity"] = lower, own
     return [f"Balance may only get better: eccentricity of at most {own * 1e6:g} um (--worse-balance lifts that)."]
+
+
+def read_prices(given: Sequence[str], usual: dict[str, float]) -> dict[str, float]:
+    """Read every `NAME=NUMBER`, and take the usual ones of the rest. **Raises:** `InputError`."""
+
+    def read(name: str, text: str) -> float:
+        if name not in usual:
+            raise InputError(f"Option --price must name one of {', '.join(usual)} here, but names '{name}'.")
+        value = read_quantity(text, "")
+        if not 0 <= value < math.inf:
+            raise ValueError(f"must be at least 0, but {value:g} was given.")
+        return value
+
+    found = usual | _read_each("--price", given, "NAME=NUMBER", read)
+    if len(found) > 1 and not sum(found.values()):
+        raise InputError("Option --price must not make all weights 0.")
+    return found
 
 
 def read_tolerances(text: str, subject: Subject, fastest: float) -> dict[str, Any]:
@@ -127,28 +145,23 @@ def _read(name: str, text: str, subject: Subject) -> Any:
 
     if len(tolerance) == 2:
         value, deviation = map(number, tolerance)
-        if not deviation > 0:
-            raise ValueError(f"must have a deviation above 0, but {deviation:g} was given.")
-        return jc.lanes.Between(value - deviation, value + deviation, normal=True)
+        return jc.files.Range(value - deviation, value + deviation, value, is_normal=True)
     if len(parts) == 2:
         lower, upper = map(number, parts)
-        return jc.lanes.Between(lower, upper)
+        return jc.files.Range(lower, upper)
     if len(parts) > 3:
         raise ValueError(f"must have {FORMS}, but '{text}' was given.")
     if len(parts) == 3:
         if not (parts[2].strip().isdecimal() and 1 <= int(parts[2]) <= MOST):
             raise ValueError(f"must have a number of values from 1 to {MOST} at its end, but has '{parts[2]}'.")
-        found = np.linspace(number(parts[0]), number(parts[1]), int(parts[2]))
-    else:
-        found = np.array([*map(number, text.split(","))])
-    if np.unique(found).size < found.size or not np.all(np.isfinite(found)):
-        raise ValueError(f"must have distinct values, but '{text}' was given.")
-    return found
+        return np.linspace(number(parts[0]), number(parts[1]), int(parts[2]))
+    return np.array([*map(number, text.split(","))])
 
 
 def _check_corners(vary: dict[str, Any], subject: Subject) -> None:
     """Check that the smallest and largest values of all varied parameters are allowed together."""
-    ends = {name: (how.min(), how.max()) if isinstance(how, np.ndarray) else how.bounds for name, how in vary.items()}
+    span = lambda how: (how.min(), how.max()) if isinstance(how, np.ndarray) else (how.lower, how.upper)
+    ends = {name: span(how) for name, how in vary.items()}
     ends.pop(SPEED, None)
     for values in itertools.islice(itertools.product(*ends.values()), MOST_CORNERS):
         try:

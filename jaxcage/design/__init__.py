@@ -69,7 +69,6 @@ from .survival_edges import (
 )
 from .unknowns import (
     REVOLUTIONS as REVOLUTIONS,
-    Clue as Clue,
     Ensemble as Ensemble,
     Narrowed as Narrowed,
     binomial_interval as binomial_interval,

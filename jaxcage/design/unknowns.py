@@ -13,7 +13,7 @@ values may lie outside the narrowed ranges.
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -80,14 +80,6 @@ def _require_some(unknowns: Sequence[Unknown]) -> None:
 Verdict = Literal["calm", "chaotic", "calm as computed", "chaotic as computed", "not decided", "too few draws"]
 
 
-class Clue(NamedTuple):
-    """Share of the variance of the chaotic share that one unknown alone explains, and `source`, how to measure it."""
-
-    label: str
-    share: float
-    source: str
-
-
 @dataclasses.dataclass(frozen=True)
 class Ensemble:
     """Chaos of designs drawn from ranges: unknowns with their `sources`, how to measure each, and SI `units`; place of
@@ -130,21 +122,6 @@ class Ensemble:
     def verdict(self) -> list[Verdict]:
         """Verdict at each speed, see `verdict_of`."""
         return [verdict_of(int(k), int(n), len(self.place)) for k, n in zip(*self.counts, strict=True)]
-
-    @property
-    def undecided(self) -> Bool[np.ndarray, " speeds"]:
-        """True for speeds at which the ranges are too wide to decide."""
-        return np.array([v == "not decided" for v in self.verdict], dtype=bool)
-
-    def clues(self, which: Bool[np.ndarray, " speeds"] | None = None) -> list[Clue]:
-        """Influence of each unknown on the chaotic share at the speeds `which`, by default all undecided ones, the
-        largest first; empty if there is nothing to decide."""
-        chosen = self.undecided if which is None else which
-        y = np.mean(self.chaotic[:, chosen], axis=1) if np.any(chosen) else np.zeros(len(self.chaotic))
-        if np.ptp(y) == 0:
-            return []
-        each = zip(self.unknowns, self.place.T, self.sources, strict=True)
-        return sorted((Clue(u.label, explained(at, y), of) for u, at, of in each), key=lambda clue: -clue.share)
 
     def between(self, low_rpm: float, high_rpm: float) -> Bool[np.ndarray, " speeds"]:
         """True for the speeds in a range or, if there are none, for the one nearest to its lower end."""

@@ -26,6 +26,7 @@ from .description import (
 )
 from .disk import check_writable as check_writable, read_bytes as read_bytes, replacing as replacing, sync as sync
 from .measurements import Measurement as Measurement, read_measurements as read_measurements
+from .plausibility import check_together as check_together
 from .ranges import Range as Range, is_range as is_range, read_range as read_range
 from .template import Subject as Subject, template as template, write_template as write_template
 from .units import (
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
         model_from as model_from,
         read_bearing as read_bearing,
     )
-    from .plausibility import check_together as check_together
     from .toml import (
         configuration as configuration,
         save_model as save_model,
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 def __getattr__(name: str) -> _Any:
     """Load what builds models, and JAX with it, with the first of its names: a wrong file is refused without."""
     if not name.startswith("_"):
-        for module in ("config", "plausibility", "toml"):
+        for module in ("config", "toml"):
             found = vars(_importlib.import_module(f".{module}", __name__))
             if name in found:
                 return found[name]

@@ -25,13 +25,13 @@ import equinox as eqx
 
 from .._arguments import require_x64
 from .._parameters import fields_from, parameter_paths
-from ..bearing import Bearing, CageMaterial, cage_body, listed, pocket_stiffness, vg
+from ..bearing import CageMaterial, cage_body, listed, pocket_stiffness, vg
 from ..forces import ImpactFromBearing
 from ..models import case, whole_bearing
-from .description import Balance, ConfigError, Description, Part, Ranges, describe, read_description, require_within
+from .description import ConfigError, Description, Part, Ranges, describe, read_description
 from .plausibility import check_together
 from .ranges import Range
-from .schema import modules, values
+from .schema import modules
 from .units import Whose
 
 
@@ -146,20 +146,10 @@ def _build(part: Part, start: Any, path: tuple[str, ...]) -> eqx.Module:
     arguments = {} if start is None else {f.name: getattr(start, f.name) for f in dataclasses.fields(kind)}
     below = {name: _build(x, getattr(start, name, None), (*path, name)) for name, x in part.parts.items()}
     arguments |= {**part.values, **below}
-    if isinstance(arguments.get("eccentricity"), Balance):
-        arguments["eccentricity"] = _permissible(arguments["eccentricity"], arguments["bearing"], kind)
     try:
         return kind(**fields_from(kind, arguments))
     except ValueError as error:
         raise ConfigError(f"Table `{'.'.join(path) or 'top level'}`: {error}") from error
-
-
-def _permissible(given: Balance, bearing: Bearing, kind: type[eqx.Module]) -> float:
-    """Eccentricity [m] that a balance grade permits: the grade over the cage's speed, ISO 21940-11."""
-    cage = given.speed if given.whose == "cage" else float(bearing.cage_speed(given.speed))
-    declared = next(f.metadata["parameter"] for f in values(kind) if f.name == "eccentricity")
-    require_within("eccentricity", 1e-3 * given.grade / cage, declared, given.text)
-    return 1e-3 * given.grade / cage
 
 
 _READY_MADE: dict[str, Callable[[Any], eqx.Module]] = {

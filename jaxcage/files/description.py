@@ -16,9 +16,11 @@ from pathlib import Path
 from typing import Any, get_args
 
 from .._allowed import ParameterInfo, allowed as must_be, must_be_given, within
-from .._catalogue import CageMaterial, cage_material, designated, dimensions, estimated
-from .._errors import InputError
+from .._catalogue import CageMaterial, cage_material, designated, estimated
+from .._errors import ConfigError
+from .._kinematics import cage_speed_ratio
 from .disk import read_bytes
+from .plausibility import check_numbers
 from .ranges import Range, is_range, read_range
 from .template import Subject, left_as_written
 from .units import NUMBER, WHOSE, Whose, printable, read_rpm, shown, to_si
@@ -42,10 +44,6 @@ BY_MATERIAL = {
 _USUAL = {"m": "mm", "kg": "g", "K": "degC"}
 """Units in which people think of a number that is wrong in SI."""
 _GRADE = re.compile(rf"\s*G\s*({NUMBER})\s*(?:at\b\s*(.*?)\s*)?", re.IGNORECASE)
-
-
-class ConfigError(InputError):
-    """A configuration that is refused; the message is one sentence that names the key and what it may be."""
 
 
 class Known(float):
@@ -77,8 +75,8 @@ class Part:
 
     module: str
     """Name of the class."""
-    values: Mapping[str, Any]
-    """Numbers in SI, choices and counts by field; a `Known` for a range, a `Balance` for a balance grade."""
+    values: dict[str, Any]
+    """Numbers in SI, choices and counts by field; a `Known` for a range."""
     parts: Mapping[str, "Part"]
     ready_made: tuple[str, Any] | None
     """Key and value by which the table starts from a ready-made module, such as `designation`."""
@@ -103,13 +101,15 @@ class Description:
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """Dimensions [SI] of the bearing and its cage, as far as they are known before anything is built."""
+        """Dimensions and masses [SI] of the bearing and its cage, and its choices."""
         bases, bearing = declarations()["subjects"][self.subject]["bases"], self.root.parts.get("bearing")
         found = {} if self.base is None else {**bases[self.base]}
         if bearing is not None:
-            found |= dimensions(bearing.ready_made[1]) if bearing.ready_made else {}
+            found |= declarations()["catalogue"][bearing.ready_made[1]] if bearing.ready_made else {}
             found |= bearing.values
-        return {**found, **self.root.values}
+        film = self.root.parts["film"].values if "film" in self.root.parts else {}
+        impact = {"impact": self.root.parts["impact"].module} if "impact" in self.root.parts else {}
+        return {**found, **film, **impact, **self.root.values}
 
 
 @functools.cache
@@ -160,7 +160,16 @@ def describe(table: Mapping[str, Any]) -> Description:
     listed = () if bearing is None or bearing.ready_made is None else estimated(bearing.ready_made[1])
     guessed = tuple(f"bearing.{name}" for name in listed if name not in rest["bearing"])
     guessed += tuple(where for name, where in made.items() if name not in {**rest, **rest.get("pockets", {})})
-    return Description(subject, base, speeds, root, ranges, table, guessed, material)
+    found = Description(subject, base, speeds, root, ranges, table, guessed, material)
+    if isinstance(given := root.values.get("eccentricity"), Balance):
+        cage, n = given.speed, found.numbers
+        if given.whose == "shaft":
+            cage *= cage_speed_ratio(n["inner_raceway_diameter"], n["roller_diameter"])
+        root.values["eccentricity"] = value = 1e-3 * given.grade / cage  # ISO 21940-11
+        declared = declarations()["modules"][module]["values"]["eccentricity"]
+        require_within("eccentricity", value, ParameterInfo(**declared, text=""), given.text)
+    check_numbers(found.numbers)
+    return found
 
 
 def _subject(table: Mapping[str, Any]) -> Subject:

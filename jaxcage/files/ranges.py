@@ -7,6 +7,7 @@ import re
 import numpy as np
 from jaxtyping import Float
 
+from .._errors import ArgumentError
 from .units import NUMBER, printable, to_si
 
 
@@ -31,6 +32,11 @@ class Range:
     """Best guess [SI]."""
     is_normal: bool = False
     """True for a normal distribution around the middle, with a third of the half width as standard deviation."""
+
+    def __post_init__(self):
+        if not (math.isfinite(self.lower) and math.isfinite(self.upper) and self.lower < self.upper):
+            said = f"must ascend, but {self.lower:g} and {self.upper:g} were given."
+            raise ArgumentError("lower", "upper", said=said)
 
     @property
     def is_logarithmic(self) -> bool:
@@ -68,7 +74,7 @@ def read_range(text: str, unit: str) -> Range:
         if unit == "K":
             raise ValueError(f'is "{printable(text)}": a temperature is given by its ends, such as "40 .. 60 degC"')
         middle, half = (to_si(part.strip(), unit) for part in _TOLERANCE.split(text, 1))
-        found = Range(middle - half, middle + half, middle, is_normal=True)
+        ends, best, is_normal = (middle - half, middle + half), middle, True
     else:
         left, _, right = text.partition("..")
         low, high = _LEFT.fullmatch(left), _RIGHT.fullmatch(right)
@@ -78,10 +84,12 @@ def read_range(text: str, unit: str) -> Range:
                 f'is "{printable(text)}", which is not a range such as "1 .. 2{example}" or "1.5 (1 .. 2){example}"'
             )
         size = lambda number, own: to_si(f"{number} {own or high[3]}".strip(), unit)
-        given = None if low[1] is None else size(low[1], "")
-        found = Range(size(low[2], low[3]), size(high[1], ""), given)
-    if not (math.isfinite(found.lower) and found.lower < found.upper):
-        raise ValueError(f'is "{printable(text)}", whose ends do not ascend')
+        ends, is_normal = (size(low[2], low[3]), size(high[1], "")), False
+        best = None if low[1] is None else size(low[1], "")
+    try:
+        found = Range(*ends, best, is_normal)
+    except ArgumentError:
+        raise ValueError(f'is "{printable(text)}", whose ends do not ascend') from None
     if not found.lower <= found.best <= found.upper:
         raise ValueError(f'is "{printable(text)}", whose best guess lies outside it')
     return found

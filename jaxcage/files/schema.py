@@ -12,7 +12,7 @@ import equinox as eqx
 
 from .._arguments import enable_x64, options
 from .._parameters import parameters
-from ..bearing import PUBLISHED_CASES
+from ..bearing import PUBLISHED_CASES, catalogue
 from ..forces import LAWS
 from ..models import NEEDED, WHOLE_BEARINGS, BearingModel, CageModel, case, whole_bearing
 from .description import SCHEMA
@@ -23,8 +23,8 @@ SUBJECTS: dict[str, tuple[type[eqx.Module], Callable[[str], Any], list[str]]] = 
     "bearing": (BearingModel, whole_bearing, [*WHOLE_BEARINGS]),
 }
 """Subject of a file -> its model, and those to start from."""
-GUIDE = ("guidance_gap", "rib_diameter", "inner_raceway_diameter", "roller_diameter")
-"""Numbers of the ready-made models from which the speed limit follows."""
+GUIDE = ("guidance_gap", "eccentricity", "cage_mass", "cage_inertia", "land_width")
+"""Numbers of the ready-made models, besides those of their bearings, that are checked before a model is built."""
 
 
 def submodules(kind: type[eqx.Module]) -> dict[str, tuple[type[eqx.Module], ...]]:
@@ -59,12 +59,25 @@ def modules() -> dict[str, type[eqx.Module]]:
 
 def schema() -> dict[str, Any]:
     """The declarations of all modules, as JSON can hold them."""
-    guide = lambda model: {name: float(parameters(model)[name]) for name in GUIDE}
+
+    def sizes(bearing: Any) -> dict[str, float]:
+        plain = {f.name: getattr(bearing, f.name) for f in values(type(bearing))}
+        return {name: x if name == "n_rollers" else float(x) for name, x in plain.items() if x is not None}
+
+    def guide(model: Any) -> dict[str, float]:
+        known = parameters(model)
+        return {name: float(known[name]) for name in GUIDE if name in known} | sizes(model.bearing)
+
     subjects = {
         name: {"module": model.__name__, "bases": {base: guide(make(base)) for base in bases}}
         for name, (model, make, bases) in SUBJECTS.items()
     }
-    return {"subjects": subjects, "modules": {name: _declared(kind) for name, kind in modules().items()}}
+    bearings = {name: sizes(each.bearing) for name, each in catalogue().items()}
+    return {
+        "subjects": subjects,
+        "catalogue": bearings,
+        "modules": {name: _declared(kind) for name, kind in modules().items()},
+    }
 
 
 def _declared(kind: type[eqx.Module]) -> dict[str, Any]:
@@ -86,5 +99,6 @@ if __name__ == "__main__":
     enable_x64()
     found = schema()
     lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(each)}" for name, each in found["modules"].items())
-    text = f'{{"subjects": {json.dumps(found["subjects"])},\n"modules": {{\n{lines}\n}}}}\n'
+    known = ",\n".join(f'"{name}": {json.dumps(found[name])}' for name in ("subjects", "catalogue"))
+    text = f'{{{known},\n"modules": {{\n{lines}\n}}}}\n'
     SCHEMA.write_text(text, encoding="utf-8")

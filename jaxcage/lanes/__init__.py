@@ -18,7 +18,7 @@
 from .._arguments import check_layer
 from .._errors import Stop as Stop
 from .dataset import load as load, save as save, stored_configuration as stored_configuration
-from .grid import Between as Between, Grid as Grid, sobol as sobol, with_values as with_values
+from .grid import Grid as Grid, sobol as sobol, with_values as with_values
 from .observe import Progress as Progress, start_tangents as start_tangents
 from .plan import Plan as Plan, Speeds as Speeds, States as States, rpm as rpm, states_at as states_at
 from .ramps import (

@@ -20,6 +20,7 @@ from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._parameters import pick
 from ..bearing import vg
+from ..files import Range
 from ..models import AbstractForcedSystem
 from ..solve import Lanes
 from .plan import SPEED, START, Plan, own_states
@@ -42,49 +43,13 @@ def sobol(unknowns: int, draws: int, seed: int | np.random.Generator) -> Float[n
     return qmc.Sobol(unknowns, rng=seed).random_base2(math.ceil(math.log2(draws)))[:draws]
 
 
-SIGMAS = 3.0
-"""Number of standard deviations from the nominal value to either end of a tolerance, for a capable process."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Between:
-    """Distribution of a parameter between two bounds: uniform or, if `normal`, truncated normal with the bounds at
-    `SIGMAS` standard deviations, as for a tolerance."""
-
-    lower: float
-    """Lower bound [SI]."""
-    upper: float
-    """Upper bound [SI]."""
-    normal: bool = False
-
-    def __post_init__(self):
-        if not (math.isfinite(self.lower) and math.isfinite(self.upper) and self.lower < self.upper):
-            raise ArgumentError(
-                "lower", "upper", said=f"must ascend, but {self.lower:g} and {self.upper:g} were given."
-            )
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Lower and upper bound [SI]."""
-        return self.lower, self.upper
-
-    def at(self, place: Float[np.ndarray, " samples"]) -> Float[np.ndarray, " samples"]:
-        """Quantiles [SI] at the probabilities `place`."""
-        if not self.normal:
-            return self.lower + place * (self.upper - self.lower)
-        from scipy.stats import truncnorm  # takes half a second to load
-
-        middle, deviation = 0.5 * (self.lower + self.upper), (self.upper - self.lower) / (2 * SIGMAS)
-        return truncnorm.ppf(place, -SIGMAS, SIGMAS, loc=middle, scale=deviation)
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class Grid:
     """Grid of samples x values x initial states, divided into chunks that are blocks of the grid."""
 
     values: Mapping[str, Float[np.ndarray, " values"]]
     """Values [SI] by parameter, one axis each."""
-    sampled: Mapping[str, Between]
+    sampled: Mapping[str, Range]
     """Distributions by parameter; all of them together form one axis."""
     samples: int
     seed: int

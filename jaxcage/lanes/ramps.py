@@ -64,7 +64,7 @@ def ramp_up_down(
         raise ArgumentError(
             "rate",
             said=f"must leave two revolutions for each of {windows} windows, but {rate * 30 / math.pi:.4g} rpm/s make "
-            f"{revolutions} in all: choose at most {slow * 30 / math.pi:.3g} rpm/s, or fewer windows.",
+            f"{revolutions} in all: choose at most {slow * 30 / math.pi:.3g} rpm/s.",
         )
     windows = round(revolutions / each)
     revolutions = each * windows

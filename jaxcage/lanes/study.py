@@ -15,9 +15,10 @@ from jaxtyping import Array, Float
 from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError, Stop
 from ..analysis import LONGEST_PERIOD, scatter
+from ..files import Range
 from ..models import AbstractForcedSystem, require_speeds
 from .dataset import coded
-from .grid import LANES, Between, Grid
+from .grid import LANES, Grid
 from .observe import Progress
 from .plan import SPEED
 from .run import run_lanes
@@ -29,7 +30,7 @@ CLOSING = 2 * LONGEST_PERIOD
 """Number of strobe states kept, enough to detect the longest period."""
 
 
-Vary = Mapping[str, Float[Array, " values"] | Float[np.ndarray, " values"] | Between]
+Vary = Mapping[str, Float[Array, " values"] | Float[np.ndarray, " values"] | Range]
 """Mapping of parameter names, `"speed"` or `"oil"` to values [SI], an axis of the grid, or to a distribution."""
 Shard = tuple[int, int]
 """Part (i, n): the i-th of n parts, counted from 1."""
@@ -58,7 +59,7 @@ def study(
     **Arguments:**
 
     - `model`: a cage, a whole bearing or a system of your own.
-    - `vary`: parameters by name. Arrays are axes of a grid [SI]; all `jaxcage.lanes.Between` are sampled together. The
+    - `vary`: parameters by name. Arrays are axes of a grid [SI]; all `jaxcage.files.Range` are sampled together. The
         speed [rad/s], of the shaft for a whole bearing, must be among them; `oil` is the ISO VG grade of a mineral oil.
     - `store`: the folder.
     - `samples`, `seed`: number of samples (a scrambled Sobol sequence; preferably a power of 2) and seed.
@@ -76,7 +77,7 @@ def study(
     **Raises:** `ValueError` for arguments that do not fit together, and for a store of another study.
     """
     require_x64()
-    sampled: dict[str, Between] = {each: how for each, how in vary.items() if isinstance(how, Between)}
+    sampled: dict[str, Range] = {each: how for each, how in vary.items() if isinstance(how, Range)}
     axes = {each: np.asarray(x, dtype=float) for each, x in vary.items() if each not in sampled}
     own = len(model.initial_states(1.0)) if initial_states is None else initial_states
     most = lanes or (LANES if model.samples == 1 else LANES // 42)

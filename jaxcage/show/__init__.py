@@ -17,17 +17,16 @@
 | `design_tables`    | designs before and after a search, shares of variance, tolerances     |
 | `chance_tables`    | chances of chaos, ranges that measurements narrowed                   |
 | `verdict_tables`   | the verdict for an operating range, its margins, what to change first |
-| `operating_speeds` | operating speeds and their place among the zones                      |
 | `report`           | answers of commands as one page of HTML                               |
 """
 
 from .chance_tables import (
-    chances_answer as chances_answer,
     chances_document as chances_document,
     chances_notes as chances_notes,
-    chances_tables as chances_tables,
+    chances_table as chances_table,
     measured_table as measured_table,
     narrowed_table as narrowed_table,
+    unknowns_notes as unknowns_notes,
 )
 from .columns import (
     branch_columns as branch_columns,
@@ -71,13 +70,6 @@ from .maps import (
     stability_map as stability_map,
     top_exponent as top_exponent,
 )
-from .operating_speeds import (
-    Operating as Operating,
-    assess as assess,
-    calmest as calmest,
-    read_operating as read_operating,
-    verdict_table as verdict_table,
-)
 from .orbit_figures import (
     multiplier_circle as multiplier_circle,
     orbit_diagram_with_branches as orbit_diagram_with_branches,
@@ -89,7 +81,6 @@ from .parameter_tables import (
     sources_table as sources_table,
 )
 from .quantity_tables import (
-    column_of as column_of,
     displacements as displacements,
     mean_over_starts as mean_over_starts,
     quantities_table as quantities_table,
@@ -110,7 +101,6 @@ from .slope_tables import (
     gradient_table as gradient_table,
     lasting_table as lasting_table,
     mean_gradient_tables as mean_gradient_tables,
-    residual_words as residual_words,
     source_notes as source_notes,
     to_be_turned as to_be_turned,
     width_table as width_table,
@@ -131,6 +121,7 @@ from .verdict_tables import (
     minimum_load_notes as minimum_load_notes,
     motion_sentence as motion_sentence,
     motion_table as motion_table,
+    motion_words as motion_words,
     range_sentence as range_sentence,
 )
 from .zone_tables import (

@@ -6,19 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..design import Clue, Ensemble, Narrowed
+from ..design import Ensemble, Narrowed
 from ..files import Measurement, Range
-from .tables import Beside, Column, Table, chosen, speed_columns, table
-
-
-MOST = 3
-"""Largest number of values advised for measurement."""
-WORDS = {
-    "not decided": "not decided by what is known",
-    "calm as computed": "calm where computed",
-    "chaotic as computed": "chaotic where computed",
-}
-"""Text of verdicts that are shown in other words."""
+from .tables import SHOWN, Beside, Column, Table, chosen, factor, speed_columns, table
 
 
 def chances_document(found: Ensemble) -> dict[str, Any]:
@@ -29,68 +19,43 @@ def chances_document(found: Ensemble) -> dict[str, Any]:
     return failed | {"chance_of_chaos": found.chance, **counts, "verdict": found.verdict}
 
 
-def chances_tables(name: str, found: Ensemble, beside: Beside = None) -> list[Table]:
-    """Tables of speed ranges with one verdict, and of the unknown values, the most influential first."""
+def chances_table(name: str, found: Ensemble, beside: Beside = None) -> Table:
+    """Table of the chances at each speed alone, with neighbouring speeds of one verdict in one row."""
     (low, high), verdicts, lost = found.interval, found.verdict, len(found.place) - found.counts[1]
     span = lambda x, unit="": " to ".join(dict.fromkeys(f"{end:.0f}" for end in (np.min(x), np.max(x)))) + unit
-    stretches = []
+    rows = []
     for verdict, places in itertools.groupby(range(len(verdicts)), key=verdicts.__getitem__):
         part = list(places)
         known = found.chance[part][np.isfinite(found.chance[part])]
         row = {"from": float(found.rpm[part[0]]), "to": float(found.rpm[part[-1]]), "failed draws": span(lost[part])}
-        row |= {"verdict": WORDS.get(verdict, verdict), "chance": span(100 * known, " %") if known.size else None}
-        stretches.append(row | {"95 % bars": span(100 * np.concatenate([low[part], high[part]]), " %")})
+        row |= {"verdict": verdict, "chance": span(100 * known, " %") if known.size else None}
+        rows.append(row | {"95 % bars": span(100 * np.concatenate([low[part], high[part]]), " %")})
     columns = [column for end in ("from", "to") for column in speed_columns(end, end, beside)]
-    title = f"Chance of chaos of {name}, {len(found.place)} draws from {len(found.unknowns)} ranges [rpm]"
-    chances = table(title, stretches, [*columns, "verdict", "chance", "95 % bars", "failed draws"])
-    shares = {clue.label: clue.share for clue in found.clues()}
-    each = zip(found.unknowns, found.units or len(found.unknowns) * ("",), found.sources, strict=True)
-    rows = [
-        {"value": u.label, "range": range_words(u.range, unit), "share": shares.get(u.label), "measure": source}
-        for u, unit, source in sorted(each, key=lambda row: -shares.get(row[0].label, 0.0))
-    ]
-    share = Column("of the verdict", "share", shown="%", digits=0)
-    return [chances, table("Unknown values", rows, ["value", "range", share], "unknowns")]
+    columns += ["verdict", "chance", "95 % bars", *(["failed draws"] if np.any(lost) else [])]
+    return table(f"Chance of chaos of {name} at each speed alone, {len(found.place)} draws [rpm]", rows, columns)
 
 
 def range_words(found: Range, unit: str) -> str:
     """Text of a range with its unit."""
-    low, high = (f"{end:.4g}".replace("e+0", "e").replace("e+", "e") for end in (found.lower, found.upper))
-    return f"{low} to {high} {'' if unit == '1' else unit}".rstrip()
-
-
-def chances_answer(found: Ensemble) -> str:
-    """Sentence on what the known values decide, and what to do about the rest."""
-    if count := int(np.sum(found.undecided)):
-        said = f"Known values do not decide between calm and chaotic at {count} of {found.rpm.size} speeds."
-        return f"{said} {measures_words(found.clues())}"
-    if "too few draws" in found.verdict:
-        return "Too few draws finished to call a speed calm or chaotic: take more --draws."
-    partly = any(v.endswith("as computed") for v in found.verdict)
-    return f"Known values decide at every speed{', as far as the draws could be computed' if partly else ''}."
+    shown, times = SHOWN.get(unit, unit), factor(unit, SHOWN.get(unit, unit)) if unit != "K" else 1.0
+    low, high = (f"{times * end:.4g}".replace("e+0", "e").replace("e+", "e") for end in (found.lower, found.upper))
+    return f"{low} to {high} {shown}".rstrip()
 
 
 def chances_notes(found: Ensemble) -> list[str]:
-    """Notes on how the draws were run, how many failed, and how to measure each unknown value."""
+    """Notes on how the draws were run, and how many failed."""
     length = f"{found.discard} revolutions left out, {found.revolutions} observed"
-    notes = [f"One initial state for each draw, {length}: chaos that dies out later counts too."]
+    notes = [f"{len(found.place)} draws from {len(found.unknowns)} ranges, one initial state each, {length}"]
     if np.any(found.failed):
         lost = f"{int(np.sum(found.failed))} of {found.failed.size} simulations failed and are in no chance"
         notes.append(f"{lost}; bars and the verdicts calm and chaotic hold whatever they would do.")
-    if partly := sum(v.endswith("as computed") for v in found.verdict):
-        notes.append(
-            f"At {partly} of {found.rpm.size} speeds the verdict is that of the draws that could be computed. "
-            "The rest are not like them, and more draws do not replace these: other steps may (--solver, --steps)."
-        )
-    return [*notes, *(f"{u.label}: {source}" for u, source in zip(found.unknowns, found.sources, strict=True))]
+    return notes
 
 
-def measures_words(clues: Sequence[Clue]) -> str:
-    """Sentence on the values to be measured, the most influential first."""
-    telling = [c for c in clues if c.share > 0][:MOST]
-    if not telling:
-        return "No single value decides: measure all, or draw more (--draws)."
-    return f"Measure {'; '.join(f'{c.label} ({c.source}), {c.share:.0%} of the verdict' for c in telling)}."
+def unknowns_notes(found: Ensemble) -> list[str]:
+    """Notes on the range of each unknown value, and how to measure it."""
+    each = zip(found.unknowns, found.units or len(found.unknowns) * ("1",), found.sources, strict=True)
+    return [f"{u.label}, {range_words(u.range, unit)}: {source}" for u, unit, source in each]
 
 
 def measured_table(found: Narrowed, measured: Sequence[Measurement], beside: Beside = None) -> Table:

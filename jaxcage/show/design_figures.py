@@ -129,13 +129,13 @@ def optimum_figure(found: "Optimum", rows: Sequence["BeforeAfter"], title: str =
 
 
 def chance_of_chaos(found: "Ensemble", ax: Axes | None = None) -> Axes:
-    """Diagram of the chance of chaos over speed with 95 % bars: blue if calm, red if chaotic, purple if undecided."""
+    """Diagram of the chance of chaos at each speed alone, with 95 % bars."""
     ax = style.axes_or_new(ax, 9.0, 4.2)
     rpm, chance, (low, high) = found.rpm, found.chance, found.interval
     groups = {
-        "calm (chance at most 5 %)": (chance <= SURE, BLUE),
-        "not decided by what is known": ((chance > SURE) & (chance < 1 - SURE), PURPLE),
-        "chaotic (at least 95 %)": (chance >= 1 - SURE, VERMILION),
+        "at most 5 % of the draws are chaotic": (chance <= SURE, BLUE),
+        "more": ((chance > SURE) & (chance < 1 - SURE), PURPLE),
+        "at least 95 %": (chance >= 1 - SURE, VERMILION),
     }
     bars = np.clip(np.array([chance - low, high - chance]), 0.0, 1.0)
     for label, (which, colour) in groups.items():
@@ -145,7 +145,7 @@ def chance_of_chaos(found: "Ensemble", ax: Axes | None = None) -> Axes:
     for level in (SURE, 1 - SURE):
         ax.axhline(level, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)))
     pad = 0.01 * (rpm[-1] - rpm[0]) or 50.0
-    ax.set(ylim=(-0.05, 1.05), xlim=(rpm[0] - pad, rpm[-1] + pad), ylabel="Chance of chaos")
+    ax.set(ylim=(-0.05, 1.05), xlim=(rpm[0] - pad, rpm[-1] + pad), ylabel="Chance of chaos at this speed")
     ax.set_yticks(np.linspace(0, 1, 6))
     style.legend_above(ax, 3)
     return label_speed(ax)

@@ -20,6 +20,7 @@ from ..bearing import PublishedCase
 from ..quantities import quantity
 from . import style
 from .quantity_tables import column_of, mean_over_starts
+from .verdict_tables import motion_words
 from .zone_tables import zone_span
 
 
@@ -83,8 +84,7 @@ def shade_zones(ax: Axes, zones: Zones | Sequence[Stretch]) -> Axes:
         shaded = [("chaotic zone", style.ZONE, 1.0, zone_span(zone, low, high)) for zone in zones.zones]
     else:
         colour_of = lambda labels: style.MOTION_COLOURS.get("".join(labels), style.GREY)
-        motion = lambda labels: " or ".join(labels).replace("_", " ")
-        shaded = [(motion(s.labels), colour_of(s.labels), 0.1, (s.low_rpm, s.high_rpm)) for s in zones]
+        shaded = [(motion_words(s.labels), colour_of(s.labels), 0.1, (s.low_rpm, s.high_rpm)) for s in zones]
     drawn: set[str] = set()
     for label, colour, alpha, (first, last) in shaded:
         name = f"_{label}" if label in drawn else label
@@ -117,14 +117,12 @@ def mark_published(ax: Axes, published: PublishedCase, text: bool = True) -> Axe
     return ax
 
 
-def mark_operating(ax: Axes, spans: Sequence[Span]) -> None:
-    """Mark operating speeds [rpm] inside the axis: a line for a speed, a light band for a range."""
-    low, high = ax.get_xlim()
-    for first, last in (span for span in spans if span[1] >= low and span[0] <= high):
-        for edge in {first, last}:
-            ax.axvline(edge, color=style.PURPLE, linewidth=1.1, linestyle=(0, (6, 2)), zorder=2)
-        ax.axvspan(first, last, color=style.PURPLE, alpha=0.12, linewidth=0, zorder=0.5)
-    ax.set_xlim(low, high)
+def mark_operating(ax: Axes, first: float, last: float) -> None:
+    """Mark the ends of an operating range [rpm] by dashed lines."""
+    limits = ax.get_xlim()
+    for edge in (first, last):
+        ax.axvline(edge, color=style.BLACK, linewidth=0.9, linestyle=(0, (6, 2)), zorder=2)
+    ax.set_xlim(limits)
 
 
 def reported(sweep: xr.Dataset, wanted: Sequence[str]) -> list[str]:

@@ -24,6 +24,7 @@ from .diagrams import label_speed, reported
 from .orbit_figures import chosen_pieces, mark_of
 from .quantity_tables import column_of
 from .tables import Column, Table, table
+from .verdict_tables import motion_words
 
 
 SPEED = "speed"
@@ -124,33 +125,25 @@ def top_exponent(found: xr.Dataset) -> Float[np.ndarray, "x y"]:
     return np.where(np.isfinite(finished), finished, np.nan)
 
 
-def stability_map(axis: Axis, curves: Sequence[Curve], ax: Axes | None = None, found: xr.Dataset | None = None) -> Axes:
-    """Bifurcation curves over speed and a parameter, coloured by kind.
-
-    **Arguments:** the parameter; curves; axes; a map of labels, whose largest exponents are drawn beneath, white at
-    zero.
+def stability_map(axis: Axis, curves: Sequence[Curve], found: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Largest exponents of a map over speed and a parameter, white at zero, with bifurcation curves on top, coloured by
+    kind.
 
     **Raises:** `ValueError` if a curve is over anything else.
     """
     if other := [f"{c.y} over {c.x}" for c in curves if (c.x, c.y) != (SPEED, axis.name)]:
         raise ArgumentError("curves", said=f"must be of {axis.name} over speed, but {', '.join(other)} was given.")
     ax = style.axes_or_new(ax, 9.0, 5.0)
-    lines = [(RPM * np.asarray(c.x_value), axis.shown(c.y_value)) for c in curves]
-    for c, (x, y) in zip(curves, lines, strict=True):
-        _draw_curve(ax, c, x, y)
+    for c in curves:
+        _draw_curve(ax, c, RPM * np.asarray(c.x_value), axis.shown(c.y_value))
     if curves:
         style.legend_above(ax)
-    if found is None:
-        across, upward = (np.concatenate([line[i] for line in lines] or [np.zeros(0)]) for i in (0, 1))
-        ax.set(xlim=style.padded_limits(across), ylim=style.padded_limits(upward))
-    else:
-        ax.grid(False)
-        x, y = _cells(found, axis)
-        look = {"cmap": "RdBu_r", "vmin": -STEEPEST, "vmax": STEEPEST, "rasterized": True, "alpha": 0.85, "zorder": 0}
-        mesh = ax.pcolormesh(x, y, np.ma.masked_invalid(top_exponent(found)).T, **look)
-        ax.figure.colorbar(mesh, ax=ax, label=quantity("largest_exponent").label, pad=0.01, extend="both")
-        ax.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
-    ax.set_ylabel(axis.column.label)
+    ax.grid(False)
+    x, y = _cells(found, axis)
+    look = {"cmap": "RdBu_r", "vmin": -STEEPEST, "vmax": STEEPEST, "rasterized": True, "alpha": 0.85, "zorder": 0}
+    mesh = ax.pcolormesh(x, y, np.ma.masked_invalid(top_exponent(found)).T, **look)
+    ax.figure.colorbar(mesh, ax=ax, label=quantity("largest_exponent").label, pad=0.01, extend="both")
+    ax.set(xlim=x[[0, -1]], ylim=y[[0, -1]], ylabel=axis.column.label)
     return label_speed(ax, axis.speed_text)
 
 
@@ -174,17 +167,15 @@ def _cells(found: xr.Dataset, axis: Axis) -> tuple[np.ndarray, np.ndarray]:
     return sides[0], sides[1]
 
 
-def map_figure(axis: Axis, curves: Sequence[Curve], found: xr.Dataset | None, title: str = "") -> Figure:
+def map_figure(axis: Axis, curves: Sequence[Curve], found: xr.Dataset, title: str = "") -> Figure:
     """Figure of a map: largest exponents with the curves on top, labels, and means of reported quantities.
 
-    **Arguments:** the parameter; curves; a map of labels, or None for the curves alone; title.
+    **Arguments:** the parameter; curves; a map of labels; title.
     """
-    if found is None:
-        return style.panels([lambda ax: stability_map(axis, curves, ax)], 1, (10.0, 6.0), title)
     borders = _cells(found, axis)
 
     def exponents(ax: Axes) -> None:
-        stability_map(axis, curves, ax, found)
+        stability_map(axis, curves, found, ax)
         ax.set_title("Largest exponent", fontsize=10, loc="left", pad=20 if curves else 6)
 
     def means(ax: Axes, name: str) -> None:
@@ -195,7 +186,10 @@ def map_figure(axis: Axis, curves: Sequence[Curve], found: xr.Dataset | None, ti
         ax.set_title(column.label, fontsize=10, loc="left")
 
     names = reported(found, MAPPED)
-    draw = [exponents, lambda ax: _colour_labels(ax, *borders, found["label"].values.astype(str))]
+    labels = found["label"].values.astype(str)
+    draw: list[Callable[[Axes], None]] = [exponents]
+    if np.any(labels != labels.flat[0]):
+        draw.append(lambda ax: _colour_labels(ax, *borders, labels))
     draw += [partial(means, name=name) for name in names]
     figure = style.panels(draw, 2, (11.5, 1.0 + 3.8 * ((len(draw) + 1) // 2)), title)
     for ax in figure.axes[1 : len(draw)]:
@@ -214,5 +208,5 @@ def _colour_labels(ax: Axes, x: np.ndarray, y: np.ndarray, labels: np.ndarray) -
     ax.pcolormesh(x, y, image)
     ax.set_title("Label (grey: the start decides, or failed)", fontsize=10, loc="left")
     met = [name for name in known if np.any(kinds == name)]
-    patches: list[Any] = [Patch(color=pale(known[name]), label=name.replace("_", " ")) for name in met]
+    patches: list[Any] = [Patch(color=pale(known[name]), label=motion_words([name])) for name in met]
     ax.legend(handles=patches, fontsize=8, loc="upper right")

@@ -5,9 +5,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .._allowed import SOURCES
 from .._catalogue import designated, estimated
-from .._parameters import EXTRA, get, readings_of, walk
-from ..files import configuration, is_range
+from .._parameters import EXTRA, get, parameter_paths, readings_of, walk
+from ..files import BearingFile, configuration, is_range
 from ..models import AbstractForcedSystem
 from .tables import OWN, UNIT, Column, Table, table as table_of
 
@@ -34,36 +35,41 @@ PUBLISHED = {
 READINGS = {"clearance_reading": "radial clearance", "unbalance": "unbalance"}
 
 
-def sources_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, left: Sequence[str] = ()) -> Table:
-    """Table of all parameters of `model` in display units, with their sources.
-
-    **Arguments:** the model; the nested mapping that it was read from, None for a published case; values on lines
-    that are still as `jaxcage init` wrote them, by dotted name.
-    """
-    rows = []
+def sources_table(model: AbstractForcedSystem, file: BearingFile | None) -> Table:
+    """Table of the parameters of `model` in display units, with their ranges and sources. Constants and zeros that the
+    file does not give are left out; None is the file of a published case."""
+    rows, table, left = [], file and file.table, file.left if file else ()
+    ranges = {name: each.range for each in (file.unknowns if file else ()) for name in each.names}
+    short = {path: name for name, path in parameter_paths(model).items()}
     for path, field in walk(model):
-        value, text, unit = get(model, path), field.metadata.get("text", ""), ""
-        info = field.metadata.get("parameter")
+        value, text, unit, between = get(model, path), field.metadata.get("text", ""), "", None
+        info, name, first = field.metadata.get("parameter"), ".".join(path), path[0]
+        given = None if table is None else _given(path, table)
         if info is not None:
+            if given is None and (info.source == SOURCES["fixed"] or not float(value)):
+                continue
             unit, number = shown(float(value), info.unit)
             text, value = info.text, f"{number:.6g}"
-        name, first = ".".join(path), path[0]
-        part = "model" if name == first else first.replace("_", " ")
+            if (known := ranges.get(short[path])) is not None:
+                between = " to ".join(f"{shown(end, info.unit, unit)[1]:.4g}" for end in (known.lower, known.upper))
         if {name, name.removesuffix("_x").removesuffix("_y")} & set(left):
-            source = "as `jaxcage init` wrote it"
+            source = "not confirmed: as `jaxcage init` wrote it"
         elif first == EXTRA:
             source = "a force of your own"
         else:
-            source = _published(model, path, field) if table is None else _in_file(path, table)
-        rows.append({"part": part, "parameter": text, "value": str(value), "shown": unit, "from": source, "name": name})
-    return table_of("All parameters", rows, ["part", "parameter", "value", Column("unit", "shown"), "from"])
+            source = _published(model, path, field) if table is None else _in_file(path, table, given)
+        row = {"part": " ".join(path[:-1]).replace("_", " ") or "cage", "parameter": text, "value": str(value)}
+        rows.append(row | {"shown": unit, "range": between, "from": source, "name": name})
+    between = ["range"] if ranges else []
+    columns = ["part", "parameter", "value", *between, Column("unit", "shown", nothing=""), "from"]
+    return table_of("Parameters; constants, and terms that are 0, are left out", rows, columns)
 
 
-def shown(value: float, unit: str) -> tuple[str, float]:
-    """Display unit of a value [SI], and the value in it."""
+def shown(value: float, unit: str, like: str = "") -> tuple[str, float]:
+    """Display unit of a value [SI], and the value in it; of a length the unit `like` if one is given."""
     if unit == "m":
-        name, times = ("µm", 1e6) if abs(value) < 1e-4 else ("mm", 1e3)
-        return name, value * times
+        name = like or ("µm" if abs(value) < 1e-4 else "mm")
+        return name, value * (1e6 if name == "µm" else 1e3)
     name, times, offset = SHOWN.get(unit, (unit, 1.0, 0.0))
     if name == "GPa" and abs(value) < 1e7:
         return unit, value
@@ -78,17 +84,23 @@ def _published(model: AbstractForcedSystem, path: tuple[str, ...], field: datacl
     return "default" if own else "identified, not printed"
 
 
-def _in_file(path: tuple[str, ...], table: Mapping[str, Any]) -> str:
+def _given(path: tuple[str, ...], table: Mapping[str, Any]) -> Any:
+    """The value of a parameter in a file; None if the file does not give it."""
     here: Any = table
     for name in path:
         here = here.get(name) if isinstance(here, Mapping) else None
     part = table.get(path[0])
     if here is None and path[-1] in ("stiffness_x", "stiffness_y") and isinstance(part, Mapping):
         here = part.get("stiffness")
-    if here is not None:
-        return "best guess in a range of this file" if isinstance(here, str) and is_range(here) else "this file"
+    return here
+
+
+def _in_file(path: tuple[str, ...], table: Mapping[str, Any], given: Any) -> str:
+    if given is not None:
+        return "best guess in a range of this file" if isinstance(given, str) and is_range(given) else "this file"
     if "material" in table and path in BY_MATERIAL:
         return f"material {table['material']}"
+    part = table.get(path[0])
     for (made, key), words in READY_MADE.items():
         if path[0] == made and isinstance(part, Mapping) and key in part:
             if key == "designation" and path[-1] in estimated(designated(part[key])):

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import jinja2
 import matplotlib
+import numpy as np
 import xarray as xr
 from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 
 from .. import __version__
 from .diagrams import CAGE, SHAFT, add_shaft_axes, mark_operating
-from .operating_speeds import Operating
 from .tables import Table, table
 
 
@@ -53,15 +53,14 @@ def page(
     sections: Sequence[Section],
     *,
     sweep: xr.Dataset,
-    operating: Sequence[Operating] = (),
+    operating: tuple[float, float] | None = None,
     command: str = "",
 ) -> str:
     """Render the report as HTML.
 
     **Arguments:** title and subtitle; sections, whose figures get axes of the shaft speed and marks of the operating
-    speeds; the sweep that has both speeds; operating speeds; the command line that created the page.
+    range; the sweep that has both speeds; operating range of its speed [rad/s]; the command line that made the page.
     """
-    spans = [(at.low_rpm, at.high_rpm) for at in operating]
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -69,11 +68,14 @@ def page(
         trim_blocks=True,
     )
 
-    def picture(figure: Figure) -> tuple[str, int, int]:
+    def picture(figure: Figure) -> tuple[str, int, int, str]:
+        marked = ""
         for ax in figure.axes:
-            if any(each.get_xlabel() in (CAGE, SHAFT) for each in ax.get_shared_x_axes().get_siblings(ax)):
-                mark_operating(ax, spans)
-        return _picture(add_shaft_axes(figure, sweep))
+            speed = any(each.get_xlabel() in (CAGE, SHAFT) for each in ax.get_shared_x_axes().get_siblings(ax))
+            if speed and operating is not None:
+                mark_operating(ax, *(end * 30 / np.pi for end in operating))
+                marked = ". The operating range is between the dashed lines."
+        return *_picture(add_shaft_axes(figure, sweep)), marked
 
     made = {"version": __version__, "command": command, "date": datetime.date.today().isoformat()}
     template = environment.get_template("page.html.j2")
@@ -99,7 +101,6 @@ def settings_table(sweep: xr.Dataset, seconds: float) -> Table:
         "versions": ", ".join([*versions, f"Python {platform.python_version()}"]),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         "steps of the sweep": " ".join(str(settings.get("method", "")).split()),
-        "random numbers": "none: the initial states are fixed",
         "time": f"{seconds:.0f} s",
     }
     return table("Settings", [{"what": what, "value": said} for what, said in rows.items() if said], ["what", "value"])

@@ -80,17 +80,11 @@ def gradient_table(name: str, model: AbstractForcedSystem, slope: Sensitivity) -
     return table(title, rows, ["parameter", "value", "SI unit", *columns])
 
 
-def residual_words(edges: Mapping[str, Sensitivity]) -> str:
-    """Largest residual of the trusted gradients in a test by scaling of units, as text."""
-    residuals = [abs(r) for e in edges.values() if e.trusted for r in e.homogeneity.values()]
-    return f"{max(residuals):.0e}" if residuals else "none is to be trusted"
-
-
 def source_notes(explained: Explained) -> list[str]:
     """Notes on the edges of chaotic zones that coincide with a bifurcation or the limit of a cascade."""
     edges = [e for zone in explained.zones.zones for e in (zone.onset, zone.exit) if e is not None]
     statistical = sum(e.basis == "statistical" for e in edges)
-    notes = [f"Chaotic edges that stay statistical: {statistical} of {len(edges)}"]
+    notes = [f"Chaotic edges that stay statistical: {statistical} of {len(edges)}"] if edges else []
     for name, source in explained.sources.items():
         if isinstance(source, Cascade):
             doublings = ", ".join(f"{float(p.speed_rpm):.1f}" for p in source.points)

@@ -121,7 +121,7 @@ class Table:
     key: str = ""
     """Name of the records in a document; empty to leave them out."""
     empty: str = "none"
-    """Text of the only row where there are no records."""
+    """Text in place of the table where there are no records."""
     detail: bool = False
     """True for a table that a command prints on request only."""
 
@@ -133,8 +133,7 @@ class Table:
     @property
     def rows(self) -> list[tuple[str, ...]]:
         """Cells as texts, row by row."""
-        nothing = (self.empty, *len(self.columns[1:]) * ("",))
-        return [tuple(c.cell(record) for c in self.columns) for record in self.records] or [nothing]
+        return [tuple(c.cell(record) for c in self.columns) for record in self.records]
 
     @property
     def texts(self) -> list[bool]:
@@ -142,6 +141,8 @@ class Table:
         return [all(isinstance(r.get(c.name), str | None) for r in self.records) for c in self.columns]
 
     def __str__(self) -> str:
+        if not self.records:
+            return f"{self.title}: {self.empty}"
         lines = [tuple(self.heads), *self.rows]
         widths = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
         aligned = lambda line: [f"{cell:>{width}}" for cell, width in zip(line[1:], widths[1:], strict=True)]
@@ -154,10 +155,11 @@ def table(
     columns: Iterable[Column | str],
     key: str = "",
     empty: str = "none",
+    detail: bool = False,
 ) -> Table:
     """Table of records, which are in a document under `key`; a column given as text is the key of its values."""
     columns = [Column(column) if isinstance(column, str) else column for column in columns]
-    return Table(title, columns, list(records), key, empty)
+    return Table(title, columns, list(records), key, empty, detail)
 
 
 def speed_columns(

@@ -40,24 +40,25 @@ def range_sentence(over: str, chance: RangeChance | None, checked: Checked | Non
 
 
 def margin_sentence(found: Margins | str, whose: str, ratio: float) -> str:
-    """Margin of the best guess, and the change that adds most to it; speeds are those of `whose`, `ratio` times as
-    large as the model's."""
+    """Margin of a design, and the change that adds most to it; speeds are those of `whose`, `ratio` times as large as
+    the model's."""
     if isinstance(found, str):
         return f"No margin: {found}"
     end, least = found.least
     if end in found.open:
         far = f"{found.lower.value:.0f} % below and {found.upper.value:.0f} % above it"
-        return f"At the best guess the synchronous orbit is stable over the whole range, and to {far}."
-    said = f"the {end} end of the range is {least.value:.2g} % of its speed away from a loss of stability"
+        return f"The synchronous orbit is stable over the whole range, and to {far}."
+    said = f"The {end} end of the range is {least.value:.2g} % of its speed away from a loss of stability"
     if least.value < 0:
         from_, to = (f"{ratio * margin.rpm:.0f}" for margin in (found.lower, found.upper))
         only = f"from {from_} rpm on" if "upper" in found.open else f"up to {to} rpm" if "lower" in found.open else ""
-        said = f"the synchronous orbit is stable only {only or f'from {from_} to {to} rpm'} of the {whose}"
+        said = f"The synchronous orbit in the middle of the range is stable only {only or f'from {from_} to {to} rpm'}"
+        said += f" of the {whose}, and the cage goes over to another motion there"
     if not (changes := found.changes):
-        return f"At the best guess {said}."
+        return f"{said}."
     first = changes[0]
     what = f"{first.amount} {'more' if first.up else 'less'} {first.name.replace('_', ' ')}"
-    return f"At the best guess {said}; {what} adds {first.gain:.2g} % of speed at its {end} end."
+    return f"{said}; {what} adds {first.gain:.2g} % of speed at its {end} end."
 
 
 def margins_table(found: Margins, beside: Beside = None) -> Table:
@@ -69,7 +70,7 @@ def margins_table(found: Margins, beside: Beside = None) -> Table:
         rows.append({"end of the range": end, "margin [%]": shown, "margin": margin.value, "rpm": margin.rpm})
     decay = "does not die out" if math.isinf(found.decay) else f"falls to 1/e in {found.decay:.2g} revolutions"
     columns = ["end of the range", "margin [%]", *speed_columns("edge [rpm]", "rpm", beside)]
-    return table(f"Margins of the best guess; a disturbance {decay} at the worst speed", rows, columns, "margins")
+    return table(f"Margins; a disturbance {decay} at the worst speed", rows, columns, "margins")
 
 
 def changes_table(model: Any, found: Margins) -> Table:
@@ -131,6 +132,11 @@ MOTION_WORDS = {
     "disordered": "neither: the cage wanders or bounces in its guide",
 }
 """Meaning of each motion."""
+
+
+def motion_words(labels: Sequence[str]) -> str:
+    """Plain words for motions."""
+    return " or ".join(MOTIONS.get(label, label) for label in labels)
 
 
 def cage_verdict(found: xr.Dataset) -> str:

@@ -1,6 +1,5 @@
-"""Tables of zones beside the published ones, of bifurcations, and of stable ranges of orbits."""
+"""Tables of zones, of bifurcations, and of stable ranges of orbits."""
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -10,13 +9,12 @@ import xarray as xr
 
 from .._errors import NoResult
 from ..analysis import Stretch as Motion, Zone, Zones, failed, lives_in_words, outcomes
-from ..bearing import PublishedCase
 from ..orbits import Point, StableRange, SynchronousOrbits, UnstableRanges
 from .tables import Beside, Column, Table, chosen, number, speed_columns, table
+from .verdict_tables import motion_words
 
 
 ENDS = ("onset", "exit")
-Span = tuple[float, float | None]
 
 
 def require_some(found: xr.Dataset, where: str = "") -> None:
@@ -25,13 +23,6 @@ def require_some(found: xr.Dataset, where: str = "") -> None:
     if failed(found).all():
         said = f"All {found['label'].size} simulations{where} failed ({', '.join(sorted(outcomes(found)))})"
         raise NoResult(f"{said}: try more steps (--steps).")
-
-
-def published_zones(published: PublishedCase | None) -> list[Span]:
-    """Onset and exit [rpm] of the published zones; the second has no published exit."""
-    if published is None:
-        return []
-    return [(published.zone_1_onset_rpm, published.zone_1_exit_rpm), (published.zone_2_onset_rpm, None)]
 
 
 def zone_record(zone: Zone) -> dict[str, Any]:
@@ -60,75 +51,38 @@ def zone_words(zone: Zone, beside: Beside = None) -> str:
     return f"from {low:.0f} rpm on" if math.isinf(high) else f"{low:.0f} to {high:.0f} rpm"
 
 
-def motion_tables(
-    name: str,
-    sweep: xr.Dataset,
-    found: Zones | Sequence[Motion],
-    published: PublishedCase | None = None,
-    beside: Beside = None,
-) -> list[Table]:
+def motion_tables(name: str, found: Zones | Sequence[Motion], beside: Beside = None) -> list[Table]:
     """Chaotic zones, and in detail their edges and the zones of chaos that dies out; or stretches of speed with the
     same labels."""
     if not isinstance(found, Zones):
-        rows = [vars(each) | {"motion": " or ".join(each.labels)} for each in found]
+        rows = [vars(each) | {"motion": motion_words(each.labels)} for each in found]
         columns = [Column("from", "low_rpm", digits=0), Column("to", "high_rpm", digits=0), "motion"]
-        columns += [Column("exponent", error="exponent_error"), "chaotic", "speeds"]
+        columns += [Column("exponent of the whole bearing", "exponent", error="exponent_error"), "speeds"]
         title = f"Zones of {name} [rpm], each edge half way between two speeds of the sweep"
         return [table(title, rows, columns, "zones")]
     lasting = f", chaos that lasts beyond {found.horizon} revolutions" if found.horizon else ""
-    title = f"Chaotic zones of {name} [rpm], resolution {found.resolution_rpm:.0f} rpm{lasting}"
-    span = float(sweep["rpm"][0]), float(sweep["rpm"][-1])
     transient = f"Transient chaos of {name}, mean life below {found.horizon} revolutions"
     return [
-        _beside_published(title, "zones", found.zones, published, span, beside),
+        _zones(f"Chaotic zones of {name} [rpm]{lasting}", "zones", found.zones, beside),
         *_details(f"Chaotic zones of {name} in detail", found.zones, beside),
         *_details(transient, found.transient, beside, "transient"),
     ]
 
 
-def unstable_table(
-    name: str, found: SynchronousOrbits, loss: UnstableRanges, published: PublishedCase | None, beside: Beside = None
-) -> Table:
-    """Table of the unstable ranges of the synchronous orbit, each with the published (chaotic) zones that overlap it
-    most."""
-    title = f"Unstable ranges of the synchronous orbit of {name} [rpm], closed below {loss.close_below_rpm:.0f} rpm"
-    between = found.lower_rpm, found.upper_rpm
-    return _beside_published(title, "unstable_ranges", loss.zones, published, between, beside)
+def unstable_table(name: str, loss: UnstableRanges, beside: Beside = None) -> Table:
+    """Table of the unstable ranges of the synchronous orbit."""
+    title = f"Unstable ranges of the synchronous orbit of {name} [rpm]"
+    return _zones(title, "unstable_ranges", loss.zones, beside)
 
 
-def _beside_published(
-    title: str, key: str, zones: Sequence[Zone], published: PublishedCase | None, range_rpm: Span, beside: Beside
-) -> Table:
-    """Table with a row for each zone and the published zones that overlap it most; its title lists published zones
-    without any overlap, and those outside the range searched [rpm]."""
-    partners: dict[int | None, list[Span]] = {}
-    for span in published_zones(published):
-        outside = span[0] > (range_rpm[1] or math.inf) or (span[1] is not None and span[1] < range_rpm[0])
-        partners.setdefault(-1 if outside else _partner(span, zones), []).append(span)
-    rows = [
-        {"zone": i + 1, **zone_record(zone), "life": _life(zone), "published": _words(partners.get(i, []))}
-        for i, zone in enumerate(zones)
-    ]
+def _zones(title: str, key: str, zones: Sequence[Zone], beside: Beside) -> Table:
+    rows = [{"zone": i, **zone_record(zone), "life": _life(zone)} for i, zone in enumerate(zones, start=1)]
     columns: list[Column | str] = ["zone"]
     for end in ENDS:
         columns += speed_columns(end, f"{end}_rpm", beside, f"{end}_uncertainty_rpm", nothing="past range")
     columns.append(Column("share", shown="%", digits=0))
     columns += [Column("mean life [revolutions]", "life")] if any(zone.life for zone in zones) else []
-    missing = {None: "Published, but not found", -1: "Published beyond this range"}
-    notes = [f"{words}: {_words(partners[which])}" for which, words in missing.items() if which in partners]
-    return table("\n".join([title, *notes]), rows, [*columns, *([] if published is None else ["published"])], key)
-
-
-def _words(spans: Sequence[Span]) -> str:
-    return ", ".join(f"{a:.0f}{' and up' if b is None else f' to {b:.0f}'}" for a, b in spans)
-
-
-def _partner(span: Span, zones: Sequence[Zone]) -> int | None:
-    """Index of the zone that overlaps a published one most; None if none does."""
-    top = math.inf if span[1] is None else span[1]
-    shared = [min(high, top) - max(low, span[0]) for low, high in map(zone_span, zones)]
-    best = max(range(len(shared)), key=shared.__getitem__, default=None)
-    return best if best is not None and shared[best] > 0 else None
+    return table(title, rows, columns, key)
 
 
 def _life(zone: Zone) -> str | None:
@@ -137,8 +91,8 @@ def _life(zone: Zone) -> str | None:
 
 
 def _details(title: str, zones: Sequence[Zone], beside: Beside, key: str = "") -> list[Table]:
-    """Mechanisms of the edges, share of chaotic initial states, and mean life of chaos in revolutions and, each at its
-    own speed, in seconds; nothing if there are no zones."""
+    """Mechanisms of the edges, and mean life of chaos in revolutions and, each at its own speed, in seconds; nothing if
+    there are no zones."""
     rows = []
     for i, zone in enumerate(zones, start=1):
         row = zone_record(zone) | {"zone": f"{i}: {zone_words(zone, beside)}"}
@@ -146,9 +100,8 @@ def _details(title: str, zones: Sequence[Zone], beside: Beside, key: str = "") -
             row["life"] = f"{_life(zone)} ({lives_in_words(zone.life, lambda life: f'{life.seconds:.1f}')} s)"
         rows.append(row)
     columns = ["zone", *(Column(f"{end} by", f"{end}_mechanism") for end in ENDS)]
-    columns.append(Column("share", shown="%", digits=0))
     columns += [Column("mean life [revolutions]", "life")] if any(zone.life for zone in zones) else []
-    return [dataclasses.replace(table(title, rows, columns, key), detail=True)] if rows else []
+    return [table(title, rows, columns, key, detail=True)] if rows else []
 
 
 AT_LIMIT_RPM = 1e-6
@@ -175,7 +128,7 @@ def stretch_table(name: str, found: SynchronousOrbits, beside: Beside = None) ->
     rows, columns = [_stretch_record(s, found) for s in found.stretches], []
     for head, end in (("from", "lower"), ("to", "upper")):
         columns += [*speed_columns(head, f"{end}_rpm", beside, digits=2), Column("by", f"{end}_kind")]
-    columns += [Column("width", "width_rpm", digits=2), Column("settled", "met"), "branch"]
+    columns += [*speed_columns("width [rpm]", "width_rpm", beside, digits=2), Column("simulations on it", "met")]
     return table(f"Stable synchronous orbits of {name} [rpm]", rows, columns, "stretches")
 
 
@@ -199,7 +152,7 @@ def edge_table(found: SynchronousOrbits, loss: UnstableRanges, beside: Beside = 
         Column("angle [deg]", "angle_deg", digits=2),
     )
     columns = [*speed, "kind", Column("multiplier", "critical"), angle, "branch", Column("edge of", "name")]
-    return table("Ends of the stable synchronous orbits [rpm]", rows, columns, "edges")
+    return table("Ends of the stable synchronous orbits [rpm]", rows, columns, "edges", detail=True)
 
 
 def unsettled_notes(found: SynchronousOrbits) -> list[str]:
