@@ -89,7 +89,7 @@ def test_derivatives_by_every_parameter_of_the_impact():
         "pocket_clearance",
         "roller_diameter",
     ]
-    names += ["roller_length", "roller_material.density", "radial_clearance"]
+    names += ["roller_length", "bearing.roller_material.density", "radial_clearance"]
     at = jnp.stack([jc.parameters(model)[name] for name in names])
 
     def logarithm(scale: Any) -> Any:
