@@ -104,8 +104,8 @@ def statements(path: Path, shaft: tuple[float, float], rng: np.random.Generator)
 @pytest.mark.slow
 def test_stated_probabilities_come_true(tmp_path: Path):
     """The number of planted bearings that are calm is the sum of the stated probabilities, within twice its error: that
-    of the planted bearings and that of the 64 draws behind each statement. Decided verdicts are not wrong more often than
-    in one of twenty cases, and the Brier score is that of honest probabilities within twice its error."""
+    of the planted bearings and that of the 64 draws behind each statement. Decided verdicts are not wrong more often
+    than in one of twenty cases, and the Brier score is that of honest probabilities within twice its error."""
     rng = np.random.default_rng(59)
     all_ = {name: statements(written(tmp_path, name, lines), at, rng) for name, (at, lines) in DESIGNS.items()}
     for name, (chance, calm) in all_.items():
