@@ -196,8 +196,8 @@ def test_traction_curve(values):
 
 
 def test_traction_falls_with_the_viscosity():
-    """The slope follows eta_p/h, by Roelands' law and the film thickness of Dowson and Higginson, from 20 to 80 °C within
-    a tenth; in the oil of the curve itself nothing changes."""
+    """The slope follows eta_p/h, by Roelands' law and the film thickness of Dowson and Higginson, from 20 to 80 °C
+    within a tenth; in the oil of the curve itself nothing changes."""
     roelands = lambda eta, p: eta * np.exp((np.log(eta) + 9.67) * ((1 + 5.1e-9 * p) ** 0.6 - 1))
     film = lambda eta: eta**0.7 * (0.6 * 5.1e-9 * (np.log(eta) + 9.67)) ** 0.54
     for pressure, exponent in ((1.5e8, 0.6), (2.2e8, 0.8), (5e8, 1.4)):

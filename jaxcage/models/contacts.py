@@ -109,12 +109,12 @@ class Traction(eqx.Module):
     def at(self, thickness: Scalar) -> TractionCurve:
         """The law in oil whose viscosity is `thickness` times that for which the curve holds.
 
-        While the oil in the contact is Newtonian, the slope is eta_p/(p h) with the viscosity eta_p at the mean pressure
-        p and the film thickness h (C. R. Evans and K. L. Johnson, Proc. IMechE C 200 (1986) 313). With Roelands' law,
-        eta_p grows as the viscosity to the power (1 + p/196 MPa)^0.6, and h as its power 0.78 (D. Dowson and G. R.
-        Higginson, with Roelands' pressure coefficient). The exponent of the slope is the difference: 0.6 at 0.15 GPa,
-        1.4 at 0.5 GPa. Peak and limit are left as they are: above a few MPa of shear they depend on the logarithm of the
-        viscosity only.
+        While the oil in the contact is Newtonian, the slope is eta_p/(p h) with the viscosity eta_p at the mean
+        pressure p and the film thickness h (C. R. Evans and K. L. Johnson, Proc. IMechE C 200 (1986) 313). With
+        Roelands' law, eta_p grows as the viscosity to the power (1 + p/196 MPa)^0.6, and h as its power 0.78 (D. Dowson
+        and G. R. Higginson, with Roelands' pressure coefficient). The exponent of the slope is the difference: 0.6 at
+        0.15 GPa, 1.4 at 0.5 GPa. Peak and limit are left as they are: above a few MPa of shear they depend on the
+        logarithm of the viscosity only.
         """
         a = self.rest - self.limit
         above = jnp.exp(1.0) * (self.peak - self.limit)
