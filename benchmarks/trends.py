@@ -158,7 +158,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true")
     quick = parser.parse_args().quick
     jc.enable_x64()
-    revolutions = 40 if quick else 120
+    revolutions = 40 if quick else 60
     text = page(trends(revolutions, 3 if quick else 6, quick), revolutions)
     print(text)
     if not quick:
