@@ -15,10 +15,15 @@ from jaxcage.files import own_rpm, read_bearing, template
 from jaxcage.solve import native
 
 
+IMPACT = """[impact]
+kind = "synchronous"
+amplitude = "121.3 (5 .. 300) N"
+exponent = "1.483 (1 .. 2)"
+"""
 PLANTED = 4
 """Bearings planted in the ranges of one file."""
 DESIGNS = {
-    "NU2310": ((10000, 26000), {}),
+    "NU2310": ((10000, 26000), {"cage_mass": '"0.25 kg"'}),
     "NU1014": (
         (16000, 26000),
         {
@@ -74,10 +79,10 @@ class Statements(NamedTuple):
 
 
 def written(folder: Path, designation: str, lines: dict[str, str]) -> Path:
-    """The short template with other lines."""
-    text = template("cage", short=True)
+    """The short template with other lines, and impacts of a given amplitude."""
+    text = template("cage", short=True).partition("[impact]")[0] + IMPACT
     for key, value in {"designation": f'"{designation}"', **lines}.items():
-        text, found = re.subn(rf"(?m)^{key} = .*$", f"{key} = {value}", text)
+        text, found = re.subn(rf"(?m)^(# )?{key} = .*$", f"{key} = {value}", text)
         assert found, key
     path = folder / f"{designation}.toml"
     path.write_text(text)
