@@ -23,7 +23,7 @@ from mkdocs.structure.files import File, Files
 ROOT = pathlib.Path(__file__).parent.parent
 PACKAGE = ROOT / "jaxcage"
 WRITTEN = {"VALIDATION.md": "validation.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"} | {
-    f"benchmarks/{name}.md": f"{name}.md" for name in ("speed", "orbits")
+    f"benchmarks/{name}.md": f"{name}.md" for name in ("speed", "orbits", "trends")
 }
 """Pages that stand elsewhere in the checkout, and where the site has them."""
 PLACES = WRITTEN | {"README.md": "index.md"}

@@ -45,7 +45,7 @@ def test_they_describe_ready_made_bearings():
     own = jc.replace(OWN, clearance_reading="radial", unbalance="physical")
     assert_alike(read(CAGE), configuration(own))
     oil = {"drag.drag_law": "cylinder", "drag.rolling_law": "bath", "drag_coefficient": 1.0, "oil_share": 0.015}
-    oil |= {"rolling_coefficient": 1.48e-6, "wear_coefficient": 6e-7}
+    oil |= {"viscosity_exponent": 0.8, "rolling_coefficient": 1.48e-6, "wear_coefficient": 6e-7}
     assert_alike(read(WHOLE), configuration(jc.replace(jc.whole_bearing("nu2310"), **oil)))
     assert all("$" not in text and max(map(len, text.splitlines())) <= 140 for text in (CAGE, WHOLE))
 

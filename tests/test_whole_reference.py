@@ -20,6 +20,8 @@ RICH = {
     "drag_coefficient": 1.2,
     "churning_coefficient": 0.6,
     "rest": 0.005,
+    "viscosity_exponent": 0.8,
+    "temperature": 330.0,
     "drag.drag_law": "cylinder",
     "drag.rolling_law": "bath",
     "outer_speed": 40.0,

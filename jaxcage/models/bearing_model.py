@@ -275,17 +275,17 @@ class BearingModel(AbstractForcedSystem):
 
     def at_speed(self, speed: Scalar) -> BearingAtSpeed:
         """The equations of motion at the shaft speed `speed` [rad/s]."""
-        bearing, races, c = self.bearing, self.raceways, self.clearance
+        bearing, races, c, oil = self.bearing, self.raceways, self.clearance, self.lubricant
         half = bearing.roller_diameter / 2
         shared = (
             bearing.raceway_stiffness,
             1.5 * races.raceway_damping,
             races.raceway_smoothing,
-            self.traction.curve,
+            self.traction.at(oil.kinematic_viscosity / oil.viscosity_1),
             self._rolling(speed),
         )
         contact, film, drag = self.contact, self.film, self.drag
-        density = drag.oil_share * self.lubricant.density
+        density = drag.oil_share * oil.density
         length = bearing.roller_length
         return BearingAtSpeed(
             model=self,

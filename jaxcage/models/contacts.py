@@ -83,6 +83,9 @@ class Traction(eqx.Module):
     traction_smoothing: Scalar = parameter(
         "m/s", 1e-6, 1.0, "sliding speed below which traction is linear in it", default=0.01
     )
+    viscosity_exponent: Scalar = parameter(
+        "1", 0.0, 2.0, "exponent of the oil's viscosity in the slope of the traction curve", default=0.0
+    )
 
     def __check_init__(self) -> None:
         known = (self.rest, self.peak, self.limit)
@@ -101,10 +104,22 @@ class Traction(eqx.Module):
         With w = A + B u_m the slope vanishes at u_m if C = B/w, and the value there is the peak if
         w exp(A/w) = e (peak - limit), whose solution is Lambert's function.
         """
+        return self.at(1.0)
+
+    def at(self, thickness: Scalar) -> TractionCurve:
+        """The law in oil whose viscosity is `thickness` times that for which the curve holds.
+
+        While the oil in the contact is Newtonian, the slope is eta_p/(p h) with the viscosity eta_p at the mean
+        pressure p and the film thickness h (C. R. Evans and K. L. Johnson, Proc. IMechE C 200 (1986) 313). With
+        Roelands' law, eta_p grows as the viscosity to the power (1 + p/196 MPa)^0.6, and h as its power 0.78 (D. Dowson
+        and G. R. Higginson, with Roelands' pressure coefficient). The exponent of the slope is the difference: 0.6 at
+        0.15 GPa, 1.4 at 0.5 GPa. Peak and limit are left as they are: above a few MPa of shear they depend on the
+        logarithm of the viscosity only.
+        """
         a = self.rest - self.limit
         above = jnp.exp(1.0) * (self.peak - self.limit)
         w = above * jnp.exp(lambert_w(-a / above))
-        b = (w - a) / self.peak_speed
+        b = (w - a) / (self.peak_speed * thickness**-self.viscosity_exponent)
         return TractionCurve(a, b, b / w, self.limit, self.traction_smoothing)
 
 

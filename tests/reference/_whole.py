@@ -48,12 +48,13 @@ class WholeBearing:
         self.r_o = self.r_i + 2 * self.half + g["radial_clearance"] / 2
         self.k = g["palmgren_constant"] * g["roller_length"] ** (8 / 9)
         self.m = g["bearing.roller_material.density"] * math.pi * self.half**2 * g["roller_length"]
-        self.curve = gupta(g["rest"], g["peak"], g["limit"], g["peak_speed"])
         self.c = g["guidance_gap"] / (2 if model.clearance_reading == "radial" else 1)
         gap = g["guidance_gap"]
         self.land = (g["inner_land_diameter"] + gap) / 2 if self.inner_guided else (g["rib_diameter"] - gap) / 2
         oil = {name.removeprefix("lubricant."): v for name, v in g.items()} | {"density": g["lubricant.density"]}
         mu, width, lands = viscosity(oil), g["land_width"], model.film.n_lands
+        steeper = (mu / oil["density"] / oil["viscosity_1"]) ** g["viscosity_exponent"]
+        self.curve = gupta(g["rest"], g["peak"], g["limit"], g["peak_speed"] / steeper)
         self.film, self.film_scale = model.film.model, lands * mu * self.land * width**3 / self.c**2
         self.petroff = lands * 2 * math.pi * mu * self.land**3 * width / self.c
         self.chi = hunt_crossley_number(g["restitution"]) / g["approach_speed"]
