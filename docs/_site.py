@@ -102,7 +102,9 @@ def gallery(notebook: pathlib.Path) -> tuple[str, dict[str, bytes]]:
                 name = f"{notebook.stem}_{len(figures) + 1}.png"
                 figures[name] = base64.b64decode("".join(data["image/png"]))
                 parts.append(f"![Figure {len(figures)} of {notebook.stem}]({name})")
-            elif said := "".join(output.get("text", data.get("text/plain", ()))):
+            elif (said := "".join(output.get("text", data.get("text/plain", ())))) and not said.startswith(
+                "<matplotlib"
+            ):
                 parts.append(f"```text\n{said.rstrip()}\n```")
     return "\n\n".join(parts), figures
 
