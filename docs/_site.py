@@ -85,7 +85,7 @@ def reference(layer: str) -> str:
 def top_reference() -> str:
     """The page of `jaxcage` itself: a table of its names, and in full those that no layer has."""
     said = lambda layer, name: _named(layer, name).docstring.value.split("\n\n")[0].replace("\n", " ")
-    link = lambda layer, name: f'<a id="jaxcage.{name}"></a>[`{name}`][jaxcage.{layer}.{name}]'
+    link = lambda layer, name: f'<a id="jaxcage.{name}"></a>[`{name}`][{_named(layer, name).path}]'
     rows = [
         f"| {link(layer, name)} | [`{layer}`]({layer}.md) | {said(layer, name)} |"
         for name, layer in sorted(homes().items(), key=lambda item: item[0].lower())
