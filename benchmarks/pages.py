@@ -104,7 +104,11 @@ BLOCKS: dict[str, tuple[str, str, Part]] = {
         figure("poincare_1a_11000rpm.png", "poincare_1a.png"),
     ),
     "runup-figure": (COMMANDS, "jaxcage runup 1a --first 8000 --last 14000", figure("runup_1a.png")),
-    "map-figure": (COMMANDS, "jaxcage map 1a --points 60x40 --no-curves", figure("map_1a.png")),
+    "map-figure": (
+        *(COMMANDS, "jaxcage map 1a --points 60x40 --no-curves"),
+        figure("map_1a_speed_guidance_gap.png", "map_1a.png"),
+    ),
+    "gradient-figure": (COMMANDS, "jaxcage gradient 1a", figure("gradient_1a.png")),
     "compare-figure": (COMMANDS, "jaxcage compare 1a 1b", figure("compare_1a_1b.png")),
     "both-kinds": (PAPER, REPRODUCE, every_kind),
     "reproduction-figure": (PAPER, REPRODUCE, figure("reproduce_fig7a.png", "reproduce_7a.png")),
