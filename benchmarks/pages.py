@@ -76,6 +76,7 @@ def every_kind(text: str) -> str:
 
 
 README, EDGE, DESIGN, PAPER = "README.md", "docs/edges.md", "docs/design.md", "docs/reproduction.md"
+COMMANDS = "docs/commands.md"
 REPRODUCE = "python -m experiments.reproduce --json"
 BETTER = 'jaxcage design nu2310 --speed "10000 rpm shaft"'
 CALM = 'jaxcage design 1a --operating "31500-44000 rpm shaft"'
@@ -93,6 +94,22 @@ BLOCKS: dict[str, tuple[str, str, Part]] = {
     "design-1b": (DESIGN, "jaxcage design 1b", tables("Before and after", "Design of")),
     "design-1b-figure": (DESIGN, "jaxcage design 1b", figure("design_1b.png")),
     "searches-of-eight": (DESIGN, "python -m benchmarks.pay --table", printed),
+    "statics-figure": (COMMANDS, "jaxcage statics 1a --speed 10000", figure("statics_1a.png")),
+    "simulate-figure": (
+        *(COMMANDS, "jaxcage simulate 1a --speed 11000"),
+        figure("simulate_1a_11000rpm.png", "simulate_1a.png"),
+    ),
+    "poincare-figure": (
+        *(COMMANDS, "jaxcage poincare 1a --speed 11000"),
+        figure("poincare_1a_11000rpm.png", "poincare_1a.png"),
+    ),
+    "runup-figure": (COMMANDS, "jaxcage runup 1a --first 8000 --last 14000", figure("runup_1a.png")),
+    "map-figure": (
+        *(COMMANDS, "jaxcage map 1a --points 60x40 --no-curves"),
+        figure("map_1a_speed_guidance_gap.png", "map_1a.png"),
+    ),
+    "gradient-figure": (COMMANDS, "jaxcage gradient 1a", figure("gradient_1a.png")),
+    "compare-figure": (COMMANDS, "jaxcage compare 1a 1b", figure("compare_1a_1b.png")),
     "both-kinds": (PAPER, REPRODUCE, every_kind),
     "reproduction-figure": (PAPER, REPRODUCE, figure("reproduce_fig7a.png", "reproduce_7a.png")),
     "bearing-design": ("docs/whole-bearing.md", BETTER, tables("Before and after", "Design of")),

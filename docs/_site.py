@@ -57,14 +57,22 @@ def _tree() -> Any:
     return griffe.load("jaxcage", search_paths=[str(ROOT)])
 
 
+def _named(layer: str, name: str) -> Any:
+    """What a layer offers under a name; where a file of the layer has the same name, what the file has."""
+    found = _tree()[layer][name]
+    return found[name] if found.is_module else found
+
+
 def entry(layer: str, name: str) -> str:
     """The entry of a name; of constants assigned two at a time, which griffe does not see, the value."""
+    path = f"jaxcage.{layer}.{name}"
     try:
-        _tree()[layer][name].docstring
+        named = _named(layer, name)
+        named.docstring
     except griffe.AliasResolutionError:
         value = getattr(importlib.import_module(f"jaxcage.{layer}"), name)
-        return f"## `{name}` {{#jaxcage.{layer}.{name}}}\n\n`{value!r}`"
-    return f"::: jaxcage.{layer}.{name}"
+        return f"## `{name}` {{#{path}}}\n\n`{value!r}`"
+    return f"::: {path}" if named.path != f"{path}.{name}" else f"[](){{#{path}}}\n\n::: {path}.{name}"
 
 
 def reference(layer: str) -> str:
@@ -76,8 +84,8 @@ def reference(layer: str) -> str:
 
 def top_reference() -> str:
     """The page of `jaxcage` itself: a table of its names, and in full those that no layer has."""
-    said = lambda layer, name: _tree()[layer][name].docstring.value.split("\n\n")[0].replace("\n", " ")
-    link = lambda layer, name: f'<a id="jaxcage.{name}"></a>[`{name}`][jaxcage.{layer}.{name}]'
+    said = lambda layer, name: _named(layer, name).docstring.value.split("\n\n")[0].replace("\n", " ")
+    link = lambda layer, name: f'<a id="jaxcage.{name}"></a>[`{name}`][{_named(layer, name).path}]'
     rows = [
         f"| {link(layer, name)} | [`{layer}`]({layer}.md) | {said(layer, name)} |"
         for name, layer in sorted(homes().items(), key=lambda item: item[0].lower())
@@ -102,7 +110,9 @@ def gallery(notebook: pathlib.Path) -> tuple[str, dict[str, bytes]]:
                 name = f"{notebook.stem}_{len(figures) + 1}.png"
                 figures[name] = base64.b64decode("".join(data["image/png"]))
                 parts.append(f"![Figure {len(figures)} of {notebook.stem}]({name})")
-            elif said := "".join(output.get("text", data.get("text/plain", ()))):
+            elif (said := "".join(output.get("text", data.get("text/plain", ())))) and not said.startswith(
+                "<matplotlib"
+            ):
                 parts.append(f"```text\n{said.rstrip()}\n```")
     return "\n\n".join(parts), figures
 
