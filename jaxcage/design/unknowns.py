@@ -22,12 +22,11 @@ from jaxtyping import Bool, Float
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
-from ..analysis import failed, restless
+from ..analysis import failed, motions, restless
 from ..files import Measurement, Range, Unknown, check_together
 from ..lanes import Progress, sobol
 from ..models import CageModel
 from ..solve import AbstractMethod, native
-from .loads import motions
 from .statistics import Runs
 
 
@@ -46,6 +45,8 @@ BINS = 4
 """Number of parts of a range whose chances are compared, to estimate how much an unknown explains."""
 KEPT = 0.25
 """Share of the draws of a stage around which the ranges close; if as many are accepted, the stage is the last."""
+RESAMPLED = 400
+"""Number of bootstrap samples for the error of an index."""
 FAR = 5.0
 """Saturation of a miss [tolerances], and the miss of a cage that wrongly rattles or is calm. Saturation is gradual, so
 that a tight tolerance still distinguishes near from far draws."""
@@ -80,12 +81,20 @@ def _require_some(unknowns: Sequence[Unknown]) -> None:
 Verdict = Literal["calm", "chaotic", "calm as computed", "chaotic as computed", "not decided", "too few draws"]
 
 
-class Clue(NamedTuple):
-    """Share of the variance of the chaotic share that one unknown alone explains, and `source`, how to measure it."""
+class Index(NamedTuple):
+    """First-order index of an unknown value: the share of the variance of an outcome that it explains alone, with its
+    standard error; how to measure it; mean outcome in the lowest and highest quarter of its range."""
 
     label: str
     share: float
+    error: float
     source: str
+    quarters: tuple[float, float]
+
+    @property
+    def telling(self) -> bool:
+        """True if the index differs from zero by more than twice its error."""
+        return self.share > 2 * self.error > 0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -136,15 +145,23 @@ class Ensemble:
         """True for speeds at which the ranges are too wide to decide."""
         return np.array([v == "not decided" for v in self.verdict], dtype=bool)
 
-    def clues(self, which: Bool[np.ndarray, " speeds"] | None = None) -> list[Clue]:
-        """Influence of each unknown on the chaotic share at the speeds `which`, by default all undecided ones, the
-        largest first; empty if there is nothing to decide."""
-        chosen = self.undecided if which is None else which
-        y = np.mean(self.chaotic[:, chosen], axis=1) if np.any(chosen) else np.zeros(len(self.chaotic))
-        if np.ptp(y) == 0:
+    def clues(self) -> list[Index]:
+        """Influence of each unknown on the chaotic share at the undecided speeds, the largest first."""
+        share = np.sum(self.chaotic[:, self.undecided], axis=1) / max(np.sum(self.undecided), 1)
+        return self.indices(share, np.full(len(share), True))
+
+    def indices(self, outcome: Float[np.ndarray, " draws"], known: Bool[np.ndarray, " draws"]) -> list[Index]:
+        """First-order indices of all unknown values for an outcome of each draw, over the known draws, largest first;
+        empty if all of these agree."""
+        y, places, rows = np.asarray(outcome, dtype=float)[known], self.place[known], []
+        if not np.any(y != y[:1]):
             return []
-        each = zip(self.unknowns, self.place.T, self.sources, strict=True)
-        return sorted((Clue(u.label, explained(at, y), of) for u, at, of in each), key=lambda clue: -clue.share)
+        picks = np.random.default_rng(0).integers(len(y), size=(RESAMPLED, len(y)))
+        for unknown, place, source in zip(self.unknowns, places.T, self.sources, strict=True):
+            error = float(np.std([_explained(place[p], y[p]) for p in picks]))
+            quarters = float(y[place < 0.25].mean()), float(y[place > 0.75].mean())
+            rows.append(Index(unknown.label, _explained(place, y), error, source, quarters))
+        return sorted(rows, key=lambda row: -row.share)
 
     def between(self, low_rpm: float, high_rpm: float) -> Bool[np.ndarray, " speeds"]:
         """True for the speeds in a range or, if there are none, for the one nearest to its lower end."""
@@ -182,13 +199,13 @@ def binomial_interval(
     return low, high
 
 
-def explained(place: np.ndarray, y: np.ndarray) -> float:
+def _explained(place: np.ndarray, y: np.ndarray) -> float:
     """Share of the variance of y between quarters of `place`, less what chance alone would give."""
     parts = np.array_split(y[np.argsort(place)], BINS)
     between = sum(part.size * (part.mean() - y.mean()) ** 2 for part in parts)
     within = sum(((part - part.mean()) ** 2).sum() for part in parts)
     noise = (BINS - 1) * within / max(y.size - BINS, 1)
-    return float(max(between - noise, 0.0) / (between + within))
+    return float(max(between - noise, 0.0) / (between + within or 1.0))
 
 
 def ensemble(

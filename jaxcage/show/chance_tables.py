@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..design import Clue, Ensemble, Narrowed
+from ..design import Ensemble, Index, Narrowed
 from ..files import Measurement, Range
 from .tables import Beside, Column, Table, chosen, speed_columns, table
 
@@ -85,7 +85,7 @@ def chances_notes(found: Ensemble) -> list[str]:
     return [*notes, *(f"{u.label}: {source}" for u, source in zip(found.unknowns, found.sources, strict=True))]
 
 
-def measures_words(clues: Sequence[Clue]) -> str:
+def measures_words(clues: Sequence[Index]) -> str:
     """Sentence on the values to be measured, the most influential first."""
     telling = [c for c in clues if c.share > 0][:MOST]
     if not telling:
