@@ -7,7 +7,7 @@ import pytest
 from helpers import document
 
 import jaxcage as jc
-from jaxcage.design import Ensemble, range_chance
+from jaxcage.design import Ensemble, indices, range_chance
 from jaxcage.files import Range, Unknown
 
 
@@ -45,7 +45,7 @@ def test_failed_draws_are_never_counted_as_calm():
 def test_an_index_tells_what_decides():
     """An outcome that one unknown decides alone has index 1 for it, and none for three others."""
     chaotic = np.repeat((np.arange(128) < 32)[:, None], 2, axis=1)
-    rows = ensemble(chaotic, unknowns=4).indices(chaotic[:, 0], np.ones(128, bool))
+    rows = indices(ensemble(chaotic, unknowns=4), chaotic[:, 0], np.ones(128, bool))
     assert [row.label for row in rows if row.telling] == ["u0"]
     assert rows[0].share > 0.95 and rows[0].quarters == (1.0, 0.0)
 

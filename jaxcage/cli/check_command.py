@@ -42,7 +42,7 @@ def check(
         speeds, told = np.linspace(*ends, d.RANGE_SPEEDS), partial(report, "draws")
         drawn = d.ensemble(subject.model, subject.unknowns, speeds, draws=draws, seed=seed, progress=told)
         chance, *outcomes = d.range_chance(drawn, ends[0] * RPM, ends[1] * RPM)
-        rows = drawn.indices(*outcomes)
+        rows = d.indices(drawn, *outcomes)
         said, note = jc.show.range_sentence(over, chance, None), jc.show.indices_note(rows)
         document |= {"verdict": chance.state, "calm_share": chance.share, "calm_interval": chance.interval}
         document |= {"draws": draws, "chaotic_draws": chance.chaotic, "known_draws": chance.known}

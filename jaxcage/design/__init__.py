@@ -69,6 +69,7 @@ from .unknowns import (
     Narrowed as Narrowed,
     binomial_interval as binomial_interval,
     ensemble as ensemble,
+    indices as indices,
     misses as misses,
     narrow as narrow,
     verdict_of as verdict_of,

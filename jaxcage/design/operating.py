@@ -307,7 +307,9 @@ class OperatingRange(_AroundEdges):
             if any(sizes[k] >= 1 for k in _maxima(sizes)):
                 return found
             if np.all(sizes <= 1) and self._stable_ends(place, found):
-                self._keep(near, place, found)
+                through = self.through(place)
+                state = near.state if through is None else through.state(near.speed) / self._scale(place, near.speed)
+                self._keep(near._replace(state=state), place, found)
                 return found
         return self._searched_again(place, near, moved)
 

@@ -17,7 +17,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Shaped
 
 from .._arguments import require_at_least
 from .._errors import ArgumentError
@@ -148,20 +148,7 @@ class Ensemble:
     def clues(self) -> list[Index]:
         """Influence of each unknown on the chaotic share at the undecided speeds, the largest first."""
         share = np.sum(self.chaotic[:, self.undecided], axis=1) / max(np.sum(self.undecided), 1)
-        return self.indices(share, np.full(len(share), True))
-
-    def indices(self, outcome: Float[np.ndarray, " draws"], known: Bool[np.ndarray, " draws"]) -> list[Index]:
-        """First-order indices of all unknown values for an outcome of each draw, over the known draws, largest first;
-        empty if all of these agree."""
-        y, places, rows = np.asarray(outcome, dtype=float)[known], self.place[known], []
-        if not np.any(y != y[:1]):
-            return []
-        picks = np.random.default_rng(0).integers(len(y), size=(RESAMPLED, len(y)))
-        for unknown, place, source in zip(self.unknowns, places.T, self.sources, strict=True):
-            error = float(np.std([_explained(place[p], y[p]) for p in picks]))
-            quarters = float(y[place < 0.25].mean()), float(y[place > 0.75].mean())
-            rows.append(Index(unknown.label, _explained(place, y), error, source, quarters))
-        return sorted(rows, key=lambda row: -row.share)
+        return indices(self, share, np.full(len(share), True))
 
     def between(self, low_rpm: float, high_rpm: float) -> Bool[np.ndarray, " speeds"]:
         """True for the speeds in a range or, if there are none, for the one nearest to its lower end."""
@@ -197,6 +184,20 @@ def binomial_interval(
     low = np.where(k > 0, beta.ppf(tail, np.maximum(k, 1e-9), n - k + 1), 0.0)
     high = np.where(k < n, beta.ppf(1 - tail, k + 1, np.maximum(n - k, 1e-9)), 1.0)
     return low, high
+
+
+def indices(found: Ensemble, outcome: Float[np.ndarray, " draws"], known: Bool[np.ndarray, " draws"]) -> list[Index]:
+    """First-order indices of all unknown values for an outcome of each draw, such as chaos in a range, over the known
+    draws, largest first; empty if all of these agree."""
+    y, rows = np.asarray(outcome, dtype=float)[known], []
+    if not np.any(y != y[:1]):
+        return []
+    picks = np.random.default_rng(0).integers(len(y), size=(RESAMPLED, len(y)))
+    for unknown, place, source in zip(found.unknowns, found.place[known].T, found.sources, strict=True):
+        error = float(np.std([_explained(place[p], y[p]) for p in picks]))
+        quarters = float(y[place < 0.25].mean()), float(y[place > 0.75].mean())
+        rows.append(Index(unknown.label, _explained(place, y), error, source, quarters))
+    return sorted(rows, key=lambda row: -row.share)
 
 
 def _explained(place: np.ndarray, y: np.ndarray) -> float:
