@@ -186,7 +186,7 @@ def binomial_interval(
     return low, high
 
 
-def indices(found: Ensemble, outcome: Float[np.ndarray, " draws"], known: Bool[np.ndarray, " draws"]) -> list[Index]:
+def indices(found: Ensemble, outcome: Shaped[np.ndarray, " draws"], known: Bool[np.ndarray, " draws"]) -> list[Index]:
     """First-order indices of all unknown values for an outcome of each draw, such as chaos in a range, over the known
     draws, largest first; empty if all of these agree."""
     y, rows = np.asarray(outcome, dtype=float)[known], []
