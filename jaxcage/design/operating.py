@@ -340,7 +340,9 @@ class OperatingRange(_AroundEdges):
 
     def begin(self, place: Float[np.ndarray, " n"]) -> None:
         """Accept the edges that a search finds at a place, even if they jumped on the way to it."""
+        told = len(self.handed_over)
         self._searched_again(place, self._nearest(place), {})
+        del self.handed_over[told:]
 
     def values(self, place: Float[np.ndarray, " n"], wanted: Sequence[Requirement]) -> dict[str, Value] | str:
         """Values of all requirements at a place of the design space; or why there are none."""

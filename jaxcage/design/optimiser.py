@@ -293,14 +293,15 @@ def _programme(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) 
     """
     end, stopped = _descent(problem, begin, say)
     trial = problem.at(end)
-    if trial.lost or not (stopped or problem.born(trial) < ACTIVE):
+    if trial.lost or problem.cost is None or not (stopped or problem.born(trial) < ACTIVE):
         return end
     told, born = len(problem.range.handed_over), np.array([r.of == "peak" for r in problem.wanted])
-    step, _ = _step(problem, trial._replace(slack=np.where(born, LOST, trial.slack)), [], LARGEST_RADIUS, trial.cost)
-    beyond = end + step
+    open_, size = trial._replace(slack=np.where(born, LOST, trial.slack)), max(abs(trial.cost), 1e-12)
+    beyond = end + _step(problem, open_, [], LARGEST_RADIUS, size)[0]
     if not problem.begin(beyond, across=True).lost:
         beyond, _ = _descent(problem, beyond, say)
         if _merit(problem, beyond) < _merit(problem, end):
+            problem.range.handed_over.append("an unstable range appeared, and the search went on beyond it")
             return beyond
     del problem.range.handed_over[told:]
     return end
