@@ -43,7 +43,7 @@ def bearings(rng: np.random.Generator) -> Iterator[tuple[str, jc.CageModel]]:
         template = write_template(pathlib.Path(folder) / "template.toml")
         files = {"template": template, "spindle": pathlib.Path(__file__).with_name("spindle.toml")}
         for name, path in files.items():
-            model = read_bearing(path).model
+            model = jc.replace(read_bearing(path).model, impact=jc.case("1a").impact)
             yield f"near {name}", changed(model, DRAWN, np.exp(rng.uniform(-0.4, 0.4, len(DRAWN))))
 
 

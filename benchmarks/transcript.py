@@ -13,20 +13,16 @@ COMMON = {"designation": '"NU1014"', "grade": "32", "temperature": '"55 degC"', 
 CAGE = COMMON | {
     "guidance_gap": '"0.25 mm +- 0.05 mm"',
     "eccentricity": '"G6.3 at 12000 rpm shaft"',
-    "cage_mass": '"0.18 kg"',
 }
 BRASS = COMMON | {
     "guidance_gap": '"0.25 mm"',
     "eccentricity": '"G6.3 at 12000 rpm shaft"',
-    "cage_mass": '"0.18 kg"',
-    "cage_inertia": '"3.8e-4 kg m^2"',
     "land_width": '"2.5 mm"',
     "rolling_coefficient": "1.12e-6",
 }
-PEEK = {"cage_mass": '"0.033 kg"', "cage_inertia": '"7e-5 kg m^2"', "pocket_stiffness": '"4e6 N/m"'}
+PEEK = {"material": '"PEEK-GF30"'}
 INNER = {"guidance": '"inner"\ninner_land_diameter = "83.5 mm"'}
-"""Values that are edited in the templates. Mass and stiffness in PEEK with glass fibres are those in brass times the
-ratios of density and modulus, 1510 to 8400 kg/m^3 and 11 to 102 GPa."""
+"""Values that are edited in the templates; mass and bars of the cage follow from its material."""
 RANGE = "--operating '4000-14000 rpm shaft'"
 
 

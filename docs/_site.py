@@ -120,7 +120,7 @@ def parameters() -> str:
     import jaxcage as jc
 
     jc.enable_x64()
-    info = jc.parameter_info(jc.case("1a"))
+    info = jc.parameter_info(jc.case("1a")) | jc.parameter_info(jc.forces.ImpactFromBearing())
     rows = (f"| `{name}` | {of.unit} | {of.text} |" for name, of in info.items())
     return "\n".join(["| parameter | unit | meaning |", "|---|---|---|", *rows])
 

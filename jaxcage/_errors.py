@@ -44,3 +44,7 @@ def shown(value: Any) -> str:
         kind = "a masked array" if isinstance(value, np.ma.MaskedArray) else "an array"
         return f"{kind} of shape {np.shape(value)} and kind {kind_of}"
     return f"something of kind {type(value).__name__}"
+
+
+class Stop(KeyboardInterrupt):
+    """Raised by a progress function to end a run of lanes early; the result is then that of the finished lanes."""

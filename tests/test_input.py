@@ -179,10 +179,10 @@ def test_a_short_file_says_the_same_as_the_long_one(subject):
 def test_a_value_is_the_users_once_its_line_is_edited(tmp_path: Path):
     path = tmp_path / "mine.toml"
     path.write_text(template(short=True))
-    assert {"cage_mass", "guidance_gap", "lubricant.grade"} <= set(read_bearing(path).left)
+    assert {"load", "guidance_gap", "lubricant.grade"} <= set(read_bearing(path).left)
     lines = template(short=True).splitlines()
-    edited = [line.partition("#")[0] if line.startswith(("cage_mass", "grade")) else line for line in lines]
+    edited = [line.partition("#")[0] if line.startswith(("load", "grade")) else line for line in lines]
     edited = [line.replace("0.45 mm +- 0.05", "0.25 mm +- 0.05") for line in edited]
     path.write_text("\n".join(edited))
     left = set(read_bearing(path).left)
-    assert not {"cage_mass", "guidance_gap", "lubricant.grade"} & left and "eccentricity" in left
+    assert not {"load", "guidance_gap", "lubricant.grade"} & left and "eccentricity" in left

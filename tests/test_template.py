@@ -17,7 +17,8 @@ from jaxcage.files import ConfigError, configuration, load_model, model_from, re
 jc.enable_x64()  # read while the tests are collected
 CAGE, WHOLE = template(), template("bearing")
 TEMPLATES = pytest.mark.parametrize("text", (CAGE, WHOLE), ids=["cage", "whole bearing"])
-MODELS = (*map(jc.case, PUBLISHED_CASES), elastic(jc.case("2a")), roller_pass(jc.case("3b")))
+OWN = jc.replace(jc.case("1a"), impact=jc.forces.ImpactFromBearing())
+MODELS = (*map(jc.case, PUBLISHED_CASES), elastic(jc.case("2a")), roller_pass(jc.case("3b")), OWN)
 FIELDS = {path: field for model in MODELS for path, field in declared(model)}
 """Everything that a file of a cage may give: its place and declaration."""
 OPTION = re.compile(r"# (?=[a-z_0-9]+ = )")
@@ -39,8 +40,9 @@ def read(template: str, text: str = "") -> dict[str, Any]:
 
 
 def test_they_describe_ready_made_bearings():
-    """Case 1a but for two readings of the paper that are misprints, and NU2310 in oil that resists its rollers."""
-    own = jc.replace(jc.case("1a"), clearance_reading="radial", unbalance="physical")
+    """Case 1a but for two misprints of the paper and impacts from the bearing, and NU2310 in oil that resists its
+    rollers."""
+    own = jc.replace(OWN, clearance_reading="radial", unbalance="physical")
     assert_alike(read(CAGE), configuration(own))
     oil = {"drag.drag_law": "cylinder", "drag.rolling_law": "bath", "drag_coefficient": 1.0, "oil_share": 0.015}
     oil |= {"rolling_coefficient": 1.48e-6, "wear_coefficient": 6e-7}
@@ -82,7 +84,7 @@ def test_nothing_that_can_be_given_is_missing():
     written = set(re.findall(r"^(?:# |#: )?([a-z_0-9]+) = ", CAGE, flags=re.M))
     assert 'effective_length = "' in CAGE and 'effective_length = "' in WHOLE  # whose default is another value
     known -= {"effective_length"}
-    assert written == known | {"kind", "grade", "base", "designation", "speeds", "stiffness"}
+    assert written == known | {"kind", "grade", "base", "designation", "material", "speeds", "stiffness"}
     for path, field in FIELDS.items():
         assert all(f'"{option}"' in CAGE for option in field.metadata.get("choice", ())), path
 

@@ -116,13 +116,14 @@ def test_no_section_finds_anything_wrong():
 
 
 def spindle() -> jc.CageModel:
-    """A bearing of one's own, as from the template of `jaxcage init` with a few lines changed."""
+    """A bearing of one's own, as from the template of `jaxcage init` with a few lines changed; impacts as in case 1a
+    throw its cage against the land."""
     given = tomllib.loads(template())
     given |= dict(guidance_gap="0.25 mm", clearance_reading="radial", unbalance="physical", load="800 N")
     lengths = dict(bore=50, outside_diameter=80, width=16, roller_diameter=7, roller_length=7, rib_diameter=70)
     given["bearing"] |= {name: f"{size} mm" for name, size in lengths.items()}
     given["bearing"] |= dict(inner_raceway_diameter="58 mm", n_rollers=18)
-    return model_from(given)
+    return jc.replace(model_from(given), impact=jc.case("1a").impact)
 
 
 @pytest.mark.wide

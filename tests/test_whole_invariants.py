@@ -12,7 +12,8 @@ from reference import WholeBearing, gupta
 from test_whole_reference import SPEED, everything, random_state, right_side
 
 import jaxcage as jc
-from jaxcage.models import BearingState, Traction, bar_stiffness
+from jaxcage.bearing import bar_stiffness
+from jaxcage.models import BearingState, Traction
 
 
 def bearing(**changed):

@@ -31,10 +31,12 @@ from .labels import (
 )
 from .loads import LAND_LOADS as LAND_LOADS, land_loads as land_loads, land_reading as land_reading, motions as motions
 from .measures import (
+    ONE_ROLLER as ONE_ROLLER,
     Measured as Measured,
     Measures as Measures,
     cage_forces as cage_forces,
     cage_history as cage_history,
+    largest_forces as largest_forces,
     measures as measures,
 )
 from .rollers import (

@@ -7,9 +7,21 @@
 | `oil` | viscosity of the oil at its temperature (ASTM D341), oils by grade |
 | `oil_drag` | drag of the oil on rollers, rolling resistance |
 | `statics` | load distribution, loaded zone, static cage displacement: (1), (2), (5), (6) |
+| `cage_body` | shape of a cage estimated from the dimensions of its bearing, stiffness of its bars |
 | `catalogue` | bearings by designation with ratings and minimum loads; the published cases and figure axes |
 """
 
+from .._catalogue import (
+    CageMaterial as CageMaterial,
+    cage_material as cage_material,
+    cage_materials as cage_materials,
+)
+from .cage_body import (
+    CageBody as CageBody,
+    bar_stiffness as bar_stiffness,
+    cage_body as cage_body,
+    pocket_stiffness as pocket_stiffness,
+)
 from .catalogue import (
     PUBLISHED_CASES as PUBLISHED_CASES,
     PUBLISHED_SPEED_RANGE_RPM as PUBLISHED_SPEED_RANGE_RPM,
@@ -26,7 +38,6 @@ from .geometry import (
     Bearing as Bearing,
     Material as Material,
     bearing_steel as bearing_steel,
-    brass as brass,
     design_rule_violations as design_rule_violations,
 )
 from .line_contact import (

@@ -29,14 +29,6 @@ class Material(eqx.Module):
     poisson_ratio: Scalar = parameter("1", 0.0, 0.5, "Poisson's ratio", kind="catalogue")
 
 
-def brass() -> Material:
-    """CuZn40Pb2, the cage brass of section 4 of the paper.
-
-    Values of the extrusion brasses of this family (CW617N, CW608N): data sheets give 8.40-8.44 g/cm^3 and 99-107 GPa.
-    """
-    return Material(density=8430.0, youngs_modulus=102e9, poisson_ratio=0.34)
-
-
 def bearing_steel() -> Material:
     """100Cr6 (SAE 52100), the steel of rings and rollers in section 4 of the paper.
 

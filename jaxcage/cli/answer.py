@@ -48,6 +48,8 @@ class Answer:
     """Suffix of the case name in file names."""
     by_ranges: bool = False
     """True if values known within ranges only were not taken at their best guesses."""
+    kept: Path | None = None
+    """Store of finished lanes, which is removed when the files are written."""
     failure: str = ""
     """Message printed after the answer if something failed; the exit status is then 1."""
 

@@ -15,6 +15,7 @@ import jaxcage as jc
 from .._errors import InputError
 from . import options as o
 from .answer import Answer
+from .check_command import forces
 from .orbit_commands import bars, explained, gradient, mapped, of_orbits
 from .progress import report as tell, visible
 from .speed_commands import chances, simulate, swept, zones_of
@@ -135,6 +136,10 @@ def report(
     verdicts = [jc.show.verdict_table(subject.name, assessed, subject.beside)] if at else []
     each = [f"{where}: {v.state} ({kind})" for where, by in assessed for kind, v in by.items()]
     table, left = (None, ()) if subject.file is None else (subject.file.table, subject.file.left)
+    if at and not subject.with_rollers:
+        table_of_forces, largest = forces(subject, (at[0].low_rpm / RPM, at[0].high_rpm / RPM))
+        verdicts.append(table_of_forces)
+        said.append(f"{largest}.")
     notes, made = subject.about(False)[1], jc.show.settings_table(found, time.perf_counter() - began)
     sections = [
         jc.show.Section("In short", [*each, answer.sentence, *said], tables=verdicts, notes=notes),

@@ -1,6 +1,7 @@
 """Standard error: progress in a terminal and in a log, warnings, and what happens at a signal."""
 
 import contextlib
+import math
 import os
 import signal
 import sys
@@ -10,24 +11,53 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any, TypeAlias
 
+from .._errors import Stop
+
 
 FILES_ARE_WHOLE = "files of earlier runs are as they were, and the same command starts over"
 SECONDS_BETWEEN_LINES = 10.0
+SECONDS_TO_ESTIMATE = 3.0
 ENDS = (signal.SIGINT, signal.SIGTERM)
 """Signals by which a command is told to end."""
+LISTENS = 5.0
+"""Time since the last report of lanes within which they are taken to run [s]."""
 _SHOW_CURSOR_AND_CLEAR_LINE = "\x1b[?25h\r\x1b[2K"
 
 Report: TypeAlias = Callable[[str, int, int], None]
 """Takes what is being done, how much of it is done, and of how much."""
 _number: int = signal.SIGINT
-_advice: str | None = None
-"""Words for a user who interrupts the computation; None outside of one."""
+_advice = FILES_ARE_WHOLE
+"""Words for a user who interrupts."""
+_computes = _stops = _stopped = False
+"""True during a computation, after it was asked to stop, and after its lanes were stopped."""
+_heard = -math.inf
+"""Time of the last report of lanes."""
 _report: Report = lambda stage, done, total: None
 
 
 def report(stage: str, done: int, total: int) -> None:
     """Report progress of the command that runs: what is being done, how much of it is done, and of how much."""
     _report(stage, done, total)
+
+
+def report_lanes(stage: str, done: int, total: int) -> None:
+    """Report progress of lanes. **Raises:** `Stop` after an interruption, for an answer from the finished ones."""
+    global _heard, _stopped
+    if _stops:
+        _stopped = True
+        raise Stop
+    _heard = time.monotonic()
+    report(stage, done, total)
+
+
+def interrupted() -> bool:
+    """True if the answer is that of the lanes that were finished when the user interrupted."""
+    return _stopped
+
+
+def advice() -> str:
+    """Words for a user who interrupts."""
+    return _advice
 
 
 def advise(text: str) -> None:
@@ -64,8 +94,8 @@ def shorten_warnings() -> None:
 def end_at_once_when_interrupted() -> None:
     """End the process at once at Ctrl-C, or when it is told to end, during a computation.
 
-    The threads of a sweep cannot be stopped, and Python would wait for them. Outside a computation, while files are
-    written, the first interruption is raised as usual, so that temporary files are removed.
+    While lanes run, the first Ctrl-C only asks them to stop. Outside a computation, while files are written, the first
+    interruption is raised as usual, so that temporary files are removed.
     """
     for each in ENDS:
         signal.signal(each, _on_interruption)
@@ -77,11 +107,15 @@ def interrupted_status() -> int:
 
 
 def _on_interruption(number: int, frame: FrameType | None) -> None:
-    global _number
+    global _number, _stops
     _number = number
+    if number == signal.SIGINT and _computes and not _stops and time.monotonic() - _heard < LISTENS:
+        _stops = True
+        say("Interrupted: the answer from what is finished follows; interrupt again to end at once.")
+        return
     for each in ENDS:
         signal.signal(each, signal.SIG_DFL)
-    if _advice is None:
+    if not _computes:
         raise KeyboardInterrupt
     if sys.stderr.isatty():
         sys.stderr.write(_SHOW_CURSOR_AND_CLEAR_LINE)
@@ -92,29 +126,42 @@ def _on_interruption(number: int, frame: FrameType | None) -> None:
 
 @contextlib.contextmanager
 def progress(text: str) -> Iterator[None]:
-    """Around a computation: a bar in a terminal, and a line every ten seconds elsewhere."""
-    global _advice, _report
+    """Around a computation: a bar in a terminal, a line every ten seconds elsewhere, and how long a stage takes."""
+    global _computes, _stops, _stopped, _report
     advise(FILES_ARE_WHOLE)
+    _computes, _stops, _stopped = True, False, False
     try:
-        with _bar(text) if sys.stderr.isatty() else contextlib.nullcontext(_line_now_and_then(text)) as _report:
+        with _bar(text) if sys.stderr.isatty() else contextlib.nullcontext(None) as bar:
+            _report = _timed(text, bar)
             yield
     finally:
-        _advice, _report = None, lambda stage, done, total: None
+        _computes, _report = False, lambda stage, done, total: None
 
 
-def _line_now_and_then(text: str) -> Report:
-    stage, began, first, said = "", time.monotonic(), 0, time.monotonic()
+def _timed(text: str, bar: Report | None) -> Report:
+    """Report that says once for each stage of more than a minute how long it takes, from its rate since the first
+    change of what is done; without a bar, also lines with what is done."""
+    stage, last, first, began, told, said = "", 0, 0, math.nan, False, time.monotonic()
 
     def report(what: str, done: int, total: int) -> None:
-        nonlocal stage, began, first, said
+        nonlocal stage, last, first, began, told, said
         now = time.monotonic()
-        if what != stage or done < first:
-            stage, began, first = what, now, done
-        if now - said < SECONDS_BETWEEN_LINES:
-            return
-        said = now
-        left = f", {(total - done) * (now - began) / (done - first) / 60:.1f} min left" if done > first else ""
-        say(f"{text}, {what}: {done} of {total}{left}")
+        if what != stage or done < last:
+            stage, began, told = what, math.nan, False
+        elif math.isnan(began) and done > last:
+            first, began = done, now
+        last = done
+        left = (total - done) * (now - began) / (done - first) / 60 if done > max(first, 0) else math.nan
+        if not told and now - began > SECONDS_TO_ESTIMATE and not math.isnan(left):
+            told = True
+            if left > 1:
+                said = now
+                say(f"{text}, {what}: about {left:.0f} min for all {total}")
+        if bar is not None:
+            bar(what, done, total)
+        elif now - said >= SECONDS_BETWEEN_LINES:
+            said = now
+            say(f"{text}, {what}: {done} of {total}{'' if math.isnan(left) else f', {left:.1f} min left'}")
 
     return report
 

@@ -3,6 +3,7 @@
 import collections
 import dataclasses
 import json
+import zlib
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,7 +16,7 @@ import jaxcage as jc
 from .._errors import InputError, NoResult
 from . import options as o
 from .answer import Answer
-from .progress import advise, report, say
+from .progress import advise, interrupted, report, report_lanes, say
 from .subject import RPM, Subject
 from .values import read_vary
 
@@ -90,18 +91,28 @@ def sweep(
 ) -> Answer:
     """Sweep over speed from several initial states: labels, exponents, chaotic zones; slips and losses of a bearing.
 
-    A file with ranges gives chances of chaos.
+    A file with ranges gives chances of chaos. After Ctrl-C the answer is that of the finished speeds; a bearing with
+    its rollers keeps them in --out, and the same command goes on from there.
     """
     return (
         chances(subject, over, draws, seed, run)
         if subject.unknowns and draws
-        else swept(subject, subject.range(over, subject.usual(251, 13)), run)[1]
+        else swept(subject, subject.range(over, subject.usual(251, 13)), run, show.out)[1]
     )
 
 
-def swept(subject: Subject, speeds: Any, run: o.RunOptions) -> tuple[Any, Answer]:
-    """The data set of a sweep over speeds [rad/s], and the answer about it."""
-    found = jc.sweep(subject.model, speeds, **run.settings, progress=partial(report, "sweep"))
+def swept(subject: Subject, speeds: Any, run: o.RunOptions, out: str | None = None) -> tuple[Any, Answer]:
+    """The data set of a sweep over speeds [rad/s], and the answer about it. With a folder `out` for finished lanes of a
+    bearing with its rollers the sweep can be stopped."""
+    kept, settings = None, jc.lanes.Run.of(subject.model, **run.settings)
+    if subject.with_rollers and out is not None:
+        numbers = {name: float(x) for name, x in jc.parameters(subject.model).items()}
+        given = numbers, speeds.tolist(), run.settings, jc.solve.cores()
+        kept = Path(out) / f"sweep_{subject.name}_unfinished_{zlib.crc32(repr(given).encode()):08x}.zarr"
+        advise("finished speeds are kept, and the same command goes on from there")
+    stage = f"lanes of {settings.discard + settings.revolutions} revolutions"
+    told = partial(report if out is None else report_lanes, stage)
+    found = jc.sweep(subject.model, speeds, **run.settings, progress=told, store=kept)
     jc.show.require_some(found)
     zones, title = zones_of(found), f"{subject.name}, {jc.analysis.length(found)}"
     if short := int(np.sum(jc.analysis.too_short(found))):
@@ -114,7 +125,7 @@ def swept(subject: Subject, speeds: Any, run: o.RunOptions) -> tuple[Any, Answer
         tables.append(jc.show.quantities_table(f"Means over initial states, {title}", found, [*names, "exponent"]))
     document = {name: found.attrs[name] for name in ("discard", "revolutions", "horizon")}
     document |= {
-        "speeds": speeds.size,
+        "speeds": found.sizes["speed"],
         "initial_states": found.sizes["initial_state"],
         "labels": counted(found),
         "too_short": short,
@@ -123,7 +134,7 @@ def swept(subject: Subject, speeds: Any, run: o.RunOptions) -> tuple[Any, Answer
     document["error"] = float(np.nanmax(found["error"].values))
     files = {"figure": jc.show.sweep_figure(found, zones, subject.published, title), "data": found}
     said, notes = said_of(subject, found, zones), transient_notes(subject, zones)
-    return found, Answer(said, tables, notes, document, files, details=[jc.summary(found)])
+    return found, Answer(said, tables, notes, document, files, details=[jc.summary(found)], kept=kept)
 
 
 def counted(found: Any) -> dict[str, int]:
@@ -166,7 +177,8 @@ def chances(subject: Subject, over: o.Range, draws: int, seed: int, run: o.RunOp
     length: dict[str, Any] = {name: min(getattr(run, name) or most, most) for name in ("discard", "revolutions")}
     length |= {"blocks": o.blocks_of(length["revolutions"]), "draws": draws, "seed": seed, "method": run.method}
     given = subject.model, subject.unknowns, subject.range(over, 40)
-    found = jc.design.ensemble(*given, **length, progress=partial(report, "draws"))
+    found = jc.design.ensemble(*given, **length, progress=partial(report_lanes, "draws"))
+    draws = len(found.place)
     if found.failed.all():
         raise NoResult(f"All {found.failed.size} simulations failed: try more steps (--steps), or narrower ranges.")
     columns = subject.speed_columns(found.speed)
@@ -331,7 +343,7 @@ def study(
 
     def stored_so_far(lanes: int, total: int) -> None:
         done.append(lanes)
-        report("lanes", lanes, total)
+        report_lanes("lanes", lanes, total)
 
     try:
         with jc.study(subject.model, given, store=path, progress=stored_so_far, **settings) as stored:
@@ -344,7 +356,9 @@ def study(
         raise NoResult(f"The store '{path}' is damaged: {again}.") from error
     dims, counts, size = found["label"].dims, counted(found), found["label"].size
     if left := counts.pop("pending", 0):
-        say(f"Warning: {jc.show.counted(left, 'lane')} left for the other shards.")
+        if not counts:
+            raise KeyboardInterrupt
+        say(f"Warning: {jc.show.counted(left, 'lane')} left{'' if interrupted() else ' for the other shards'}.")
     lanes = found.stack(lane=dims)
     jc.show.require_some(lanes.isel(lane=np.flatnonzero(lanes["label"].values != "pending")))
     document = {"axes": dict(zip(dims, found["label"].shape, strict=True)), "lanes": size, "labels": counts}

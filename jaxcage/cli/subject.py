@@ -170,7 +170,7 @@ class Subject:
         notes = {
             "Readings": [*filter(None, [jc.show.readings_words(self.model)])],
             "Lines still as `jaxcage init` wrote them (change or delete the comment of one that is yours)": left,
-            "Estimated for the catalogue, which no maker prints": estimated,
+            "Estimated from other dimensions, as no maker prints them": estimated,
             "Best guesses of values known within ranges only": guesses,
         }
         return document, [f"{what}: {', '.join(values)}" for what, values in notes.items() if values]
@@ -223,4 +223,11 @@ def read_case(given: str) -> Subject:
         say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
     for doubt in found.model.lubricant.doubts():
         say(f"Warning: {doubt}")
+    material, oil = None if found.file is None else found.file.material, float(found.model.lubricant.temperature)
+    if material is not None and oil > material.limit:
+        kelvin = 273.15
+        say(
+            f"Warning: the oil of {oil - kelvin:.0f} degC is hotter than a cage of {material.name} bears, "
+            f"{material.limit - kelvin:.0f} degC."
+        )
     return found

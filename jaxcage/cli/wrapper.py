@@ -9,6 +9,7 @@ import io
 import itertools
 import logging
 import os
+import shutil
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -27,8 +28,9 @@ from . import (
 from .answer import Answer, complete, print_answer
 from .options import ShowOptions, flag
 from .progress import (
-    FILES_ARE_WHOLE,
+    advice,
     end_at_once_when_interrupted,
+    interrupted,
     interrupted_status,
     progress,
     say,
@@ -77,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say("There is not enough memory for this: ask for fewer speeds, lanes or revolutions.")
         return FAILED
     except KeyboardInterrupt:
-        say(f"Interrupted: {FILES_ARE_WHOLE}.")
+        say(f"Interrupted: {advice()}.")
         return interrupted_status()
 
 
@@ -113,6 +115,8 @@ def _run(call: functools.partial[Answer]) -> None:
             raise MemoryError from error
         raise
     print_answer(answer, show.json, show.details)
+    if interrupted():
+        raise KeyboardInterrupt
     if answer.failure:
         raise NoResult(answer.failure)
 
@@ -129,7 +133,13 @@ def _of_a_case(call: functools.partial[Answer], show: ShowOptions) -> Answer:
     check_writable(show.out)
     with progress(f"{command} {cases['subject'].name}"):
         answer = call(**cases)
-    return complete(answer, command, cases["subject"], show.out, time.perf_counter() - began)
+    if interrupted():
+        said, document = f"Partial, since it was interrupted: {answer.sentence}", {**answer.document, "partial": True}
+        answer = dataclasses.replace(answer, sentence=said, document=document, part=f"{answer.part}_partial")
+    answer = complete(answer, command, cases["subject"], show.out, time.perf_counter() - began)
+    if answer.kept and not interrupted():
+        shutil.rmtree(answer.kept)
+    return answer
 
 
 def _about_options(error: ArgumentError, call: functools.partial[Answer]) -> Exception:

@@ -19,7 +19,8 @@ SPEEDS = 24  # simulated over the operating range
 @dataclasses.dataclass(frozen=True)
 class Checked:
     """Results of simulations of a design over speeds [rpm] of its operating range: shares of the trajectories by label,
-    the speeds at which some are chaotic, and the mean life of chaos there [revolutions], infinite where none ended."""
+    the speeds at which some are chaotic, and the mean life of chaos there [revolutions], infinite where none ended, and
+    NaN after a stop."""
 
     speeds_rpm: Float[np.ndarray, " speeds"]
     initial_states: int
@@ -43,7 +44,8 @@ class Checked:
         ends = self.mean_life.min(), self.mean_life.max()
         lasts = " to ".join(f"{x:.0f}" if np.isfinite(x) else "no end seen" for x in ends)
         where = f"at {self.chaotic_rpm.size} of the speeds, {low} to {high}"
-        return f"{said}; chaos coexists {where}, with a mean life of {lasts} revolutions"
+        said = f"{said}; chaos coexists {where}"
+        return said if np.isnan(ends[0]) else f"{said}, with a mean life of {lasts} revolutions"
 
 
 def check_design(
@@ -64,7 +66,8 @@ def check_design(
     found = sweep(model, speeds, initial_states=states, progress=told)
     labels, counts = np.unique(found["label"].values, return_counts=True)
     shares = dict(zip(labels.tolist(), (counts / counts.sum()).tolist(), strict=True))
-    rpm, where = speeds * 30 / np.pi, np.flatnonzero(restless(found))
-    lives = np.array([survival_at(found, int(i)).mean_life for i in where])
+    rpm, where = found["rpm"].values, np.flatnonzero(restless(found))
+    followed = "escape" in found  # not after a stop
+    lives = np.array([survival_at(found, int(i)).mean_life if followed else np.nan for i in where])
     method = json.loads(found.attrs["settings"])["method"]
     return Checked(rpm, states.shape[1], shares, int(np.sum(failed(found))), rpm[where], lives, method)

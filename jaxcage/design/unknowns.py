@@ -233,6 +233,7 @@ def ensemble(
     place, info = sobol(len(unknowns), draws, seed), parameter_info(model)
     more |= {"discard": discard, "revolutions": revolutions}
     _, found = _run_draws(model, unknowns, place, speeds, method, **more)
+    place = place[: found.sizes["design"]]  # fewer after a stop
     rough, lost, at = restless(found), failed(found)[..., 0], np.asarray(speeds, dtype=float)
     sources, units = zip(*((info[u.names[0]].source, info[u.names[0]].unit) for u in unknowns), strict=True)
     return Ensemble(tuple(unknowns), sources, place, at, rough, lost, discard, revolutions, units)

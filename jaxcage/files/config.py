@@ -25,7 +25,8 @@ import equinox as eqx
 
 from .._arguments import require_x64
 from .._parameters import fields_from, parameter_paths
-from ..bearing import Bearing, listed, vg
+from ..bearing import Bearing, CageMaterial, cage_body, listed, pocket_stiffness, vg
+from ..forces import ImpactFromBearing
 from ..models import case, whole_bearing
 from .description import Balance, ConfigError, Description, Part, Ranges, describe, read_description, require_within
 from .plausibility import check_together
@@ -59,7 +60,9 @@ class BearingFile:
     left: tuple[str, ...]
     """Dotted names of values on lines that are still as `jaxcage init` wrote them."""
     estimated: tuple[str, ...]
-    """Dotted names of values from the catalogue of bearings that no maker prints."""
+    """Dotted names of values that no maker prints, estimated for the catalogue or from the material of the cage."""
+    material: CageMaterial | None
+    """Material of the cage, if it is named."""
     table: Mapping[str, Any]
 
 
@@ -82,7 +85,7 @@ def read_bearing(path: str | Path) -> BearingFile:
         model = _model(found, unknowns)
     except ConfigError as error:
         raise ConfigError(f"File '{path}': {error}") from error
-    return BearingFile(model, found.speeds, tuple(unknowns), found.left, found.estimated, found.table)
+    return BearingFile(model, found.speeds, tuple(unknowns), found.left, found.estimated, found.material, found.table)
 
 
 def model_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) -> Any:
@@ -99,11 +102,31 @@ def model_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) 
 def _model(found: Description, unknowns: list[Unknown] | None) -> Any:
     require_x64()
     start = None if found.base is None else (case if found.subject == "cage" else whole_bearing)(found.base)
-    model: Any = _build(found.root, start, ())
+    root = found.root if found.material is None else _filled(found.root, found.material, start)
+    model: Any = _build(root, start, ())
     check_together(model)
     if unknowns is not None:
         unknowns += _named(model, found.ranges)
     return model
+
+
+def _filled(root: Part, material: CageMaterial, start: Any) -> Part:
+    """A cage or bearing with the values that follow from the material of its cage, where it does not give them."""
+    given, parts, values = root.parts.get("bearing"), dict(root.parts), root.values
+    bearing: Any = start.bearing if given is None else _build(given, getattr(start, "bearing", None), ("bearing",))
+    gap = values["guidance_gap"] if "guidance_gap" in values else start.guidance_gap
+    body, modulus = cage_body(bearing, gap), material.youngs_modulus
+    own: dict[str, Any] = {"cage_mass": material.density * body.volume, **values}
+    below: dict[str, dict[str, Any]] = {}
+    if "pockets" in parts:
+        own = {"cage_inertia": own["cage_mass"] * body.gyration, **own}
+        stiffness = pocket_stiffness(bearing, gap, modulus)
+        below["pockets"] = {"pocket_stiffness": stiffness, "pocket_friction": material.friction}
+    elif "impact" in parts and parts["impact"].module == ImpactFromBearing.__name__:
+        below["impact"] = {"cage_modulus": modulus}
+    for name, made in below.items():
+        parts[name] = dataclasses.replace(parts[name], values={**made, **parts[name].values})
+    return dataclasses.replace(root, values=own, parts=parts)
 
 
 def _named(model: eqx.Module, ranges: Ranges) -> list[Unknown]:

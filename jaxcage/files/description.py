@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from .._allowed import ParameterInfo, allowed as must_be, must_be_given, within
-from .._catalogue import designated, dimensions, estimated
+from .._catalogue import CageMaterial, cage_material, designated, dimensions, estimated
 from .._errors import InputError
 from .disk import read_bytes
 from .ranges import Range, is_range, read_range
@@ -29,6 +29,16 @@ Ranges = dict[tuple[str, ...], tuple[Range, tuple[str, ...]]]
 """Path of a key with a range -> the range, and the fields of that table that it sets."""
 _SHORTHANDS = {("support", "stiffness"): ("stiffness_x", "stiffness_y")}
 """Keys that set several parameters to one value."""
+BY_MATERIAL = {
+    "cage": {"cage_mass": "cage_mass"},
+    "bearing": {
+        "cage_mass": "cage_mass",
+        "cage_inertia": "cage_inertia",
+        "pocket_stiffness": "pockets.pocket_stiffness",
+        "pocket_friction": "pockets.pocket_friction",
+    },
+}
+"""Values that the material of the cage gives where a file does not, with their dotted names."""
 _USUAL = {"m": "mm", "kg": "g", "K": "degC"}
 """Units in which people think of a number that is wrong in SI."""
 _GRADE = re.compile(rf"\s*G\s*({NUMBER})\s*(?:at\b\s*(.*?)\s*)?", re.IGNORECASE)
@@ -85,7 +95,9 @@ class Description:
     ranges: Ranges
     table: Mapping[str, Any]
     estimated: tuple[str, ...]
-    """Dotted names of values from the catalogue that no maker prints."""
+    """Dotted names of values that no maker prints, estimated for the catalogue or from the material of the cage."""
+    material: CageMaterial | None = None
+    """Material of the cage, if it is named."""
     left: tuple[str, ...] = ()
     """Dotted names of values on lines that are still as `jaxcage init` wrote them."""
 
@@ -136,14 +148,19 @@ def describe(table: Mapping[str, Any]) -> Description:
     if "base" in table and base not in [*bases]:  # of any type
         raise ConfigError(f"`base` must be one of {', '.join(bases)}, but is {shown(base)}.")
     ranges: Ranges = {}
-    rest = {key: value for key, value in table.items() if key not in ("speeds", "model", "base")}
-    root = _checked(module, rest, base is not None, (), ranges, speeds)
+    rest = {key: value for key, value in table.items() if key not in ("speeds", "model", "base", "material")}
+    material = _material(table["material"]) if "material" in table else None
+    made = {} if material is None else BY_MATERIAL[subject]
+    if made and subject == "bearing":
+        rest = {"pockets": {}} | rest
+    root = _checked(module, rest, base is not None, (), ranges, speeds, tuple(made))
     if base is None and root.values.get("guidance") == "inner" and "inner_land_diameter" not in rest:
         raise ConfigError('`inner_land_diameter` must be given with guidance = "inner".')
     bearing = root.parts.get("bearing")
-    made = () if bearing is None or bearing.ready_made is None else estimated(bearing.ready_made[1])
-    guessed = tuple(f"bearing.{name}" for name in made if name not in rest["bearing"])
-    return Description(subject, base, speeds, root, ranges, table, guessed)
+    listed = () if bearing is None or bearing.ready_made is None else estimated(bearing.ready_made[1])
+    guessed = tuple(f"bearing.{name}" for name in listed if name not in rest["bearing"])
+    guessed += tuple(where for name, where in made.items() if name not in {**rest, **rest.get("pockets", {})})
+    return Description(subject, base, speeds, root, ranges, table, guessed, material)
 
 
 def _subject(table: Mapping[str, Any]) -> Subject:
@@ -156,9 +173,16 @@ def _subject(table: Mapping[str, Any]) -> Subject:
 
 
 def _checked(
-    module: str, table: Mapping[str, Any], started: bool, path: tuple[str, ...], ranges: Ranges, speeds: Whose
+    module: str,
+    table: Mapping[str, Any],
+    started: bool,
+    path: tuple[str, ...],
+    ranges: Ranges,
+    speeds: Whose,
+    made: tuple[str, ...],
 ) -> Part:
-    """A table of values of a module; `started` if there is a base from which it takes what it leaves out."""
+    """A table of values of a module; `started` if there is a base from which it takes what it leaves out. Names in
+    `made` need not be given."""
     declared, table, ready_made = declarations()["modules"][module], dict(table), None
     fields, nested = declared["values"], declared["tables"]
     for (where, key), read in _READY_MADE.items():
@@ -181,9 +205,9 @@ def _checked(
             raise ConfigError(f"`{_dotted(path, name)}` must be a table of values, but is {shown(below)}.")
         kind = _kind(options, below, started, (*path, name))
         below = {key: value for key, value in below.items() if key != "kind" or len(options) == 1}
-        parts[name] = _checked(kind, below, started and kind == options[0], (*path, name), ranges, speeds)
+        parts[name] = _checked(kind, below, started and kind == options[0], (*path, name), ranges, speeds, made)
     if not started:
-        _require_whole(module, {*found, *parts}, path)
+        _require_whole(module, {*found, *parts, *made}, path)
     return Part(module, found, parts, ready_made)
 
 
@@ -206,6 +230,7 @@ def _require_whole(module: str, given: set[str], path: tuple[str, ...]) -> None:
     if missing := [_dotted(path, name) for name in declared["needed"] if name not in given]:
         ready = [*(f'base = "{name}"' for name in bases), *(['designation = "NU1014"'] if module == "Bearing" else [])]
         hint = f", unless `{ready[0]}` or the like gives the rest" if ready else ""
+        hint += ', or `material = "brass"` or the like the mass' if "cage_mass" in missing else ""
         raise ConfigError(f"`{'`, `'.join(missing)}` must be given{hint}.")
     readings = {name: each["readings"] for name, each in declared["values"].items() if "readings" in each}
     if left := [name for name in readings if name not in given]:
@@ -221,7 +246,7 @@ def _refuse_unknown(
     table: Mapping[str, Any], fields: Iterable[str], nested: Iterable[str], path: tuple[str, ...]
 ) -> None:
     keys = [*fields, *(where[-1] for where in _SHORTHANDS if where[:-1] == path)]
-    extra = [key for where, key in _READY_MADE if (where,) == path] if path else ["base", "model", "speeds"]
+    extra = [key for where, key in _READY_MADE if (where,) == path] if path else ["base", "model", "speeds", "material"]
     for key in table:
         if key in keys or key in nested:
             continue
@@ -301,6 +326,15 @@ def _designation(given: Any) -> str:
         return designated(given)
     except ValueError as error:
         raise ConfigError(str(error).replace("Argument `designation`", "`bearing.designation`")) from error
+
+
+def _material(given: Any) -> CageMaterial:
+    if not isinstance(given, str):
+        raise ConfigError(f'`material` must be a text such as "PEEK-GF30", but is {shown(given)}.')
+    try:
+        return cage_material(given)
+    except ValueError as error:
+        raise ConfigError(str(error).replace("Argument `name`", "`material`")) from error
 
 
 def _grade(given: Any) -> float:

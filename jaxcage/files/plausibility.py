@@ -58,6 +58,9 @@ def _checks(model: CageModel | BearingModel) -> Iterator[tuple[bool, str, str]]:
         inertia, ring = float(model.cage_inertia), mass * float(b.pitch_diameter) ** 2 / 4
         must = f"be that of a ring, between a tenth and ten times {ring:.2g} kg m^2 for a cage of {1e3 * mass:g} g"
         yield not 0.1 * ring <= inertia <= 10 * ring, "cage_inertia", f"{must}, but is {inertia:g} kg m^2"
+    elif model.impact.kind != "synchronous":
+        must = "be above 0 N for impacts of rollers that enter and leave the loaded zone, but is 0 N"
+        yield float(model.load) == 0, "load", must
     points = "by ASTM D341 its two points, reference and temperature give none"
     known = math.isfinite(float(model.lubricant.dynamic_viscosity))
     yield not known, "lubricant", f"have a viscosity at its temperature, but {points}"

@@ -12,7 +12,7 @@ from .._errors import InputError
 Subject = Literal["cage", "bearing"]
 """Subject of a file: the cage in its land, or the whole bearing."""
 CHOSEN = (
-    *("model", "speeds", "guidance", "clearance_reading", "unbalance", "kind"),
+    *("model", "speeds", "material", "guidance", "clearance_reading", "unbalance", "kind"),
     *("drag_coefficient", "drag_law", "rolling_law", "oil_share", "wear_coefficient"),
 )
 """Keys of the templates that are no numbers of the NU2310."""

@@ -39,11 +39,14 @@ from .film import (
     half_circle_resistance as half_circle_resistance,
 )
 from .impact import (
+    BarPulse as BarPulse,
+    ImpactFromBearing as ImpactFromBearing,
     PocketImpact as PocketImpact,
     RollerPassImpact as RollerPassImpact,
     SynchronousForce as SynchronousForce,
     SynchronousImpact as SynchronousImpact,
     approach_speed as approach_speed,
+    bar_pulse as bar_pulse,
     impact_history as impact_history,
     pulse_spectrum as pulse_spectrum,
     pulse_train as pulse_train,
@@ -65,5 +68,8 @@ from .law import (
 from .support import ElasticRib as ElasticRib, RigidRib as RigidRib, Support as Support
 
 
-LAWS: tuple[type[AbstractLaw], ...] = (RibFilm, LandContact, Support, SynchronousImpact, RollerPassImpact)
+LAWS: tuple[type[AbstractLaw], ...] = (
+    *(RibFilm, LandContact, Support),
+    *(SynchronousImpact, ImpactFromBearing, RollerPassImpact),
+)
 """Built-in laws of a cage and its configuration file, in the order in which forces are listed and added."""

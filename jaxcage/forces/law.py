@@ -97,6 +97,8 @@ class GuidedCage(Protocol):
     bearing: Any
     lubricant: Any
     load: Scalar
+    cage_mass: Scalar
+    guidance_gap: Scalar
 
     @property
     def clearance(self) -> Any:

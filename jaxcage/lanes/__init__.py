@@ -16,6 +16,7 @@
 """
 
 from .._arguments import check_layer
+from .._errors import Stop as Stop
 from .dataset import load as load, save as save, stored_configuration as stored_configuration
 from .grid import Between as Between, Grid as Grid, sobol as sobol, with_values as with_values
 from .observe import Progress as Progress, start_tangents as start_tangents
@@ -28,8 +29,8 @@ from .ramps import (
 )
 from .run import run_lanes as run_lanes, sweep as sweep
 from .settings import Run as Run
-from .store import Store as Store, open_study as open_study
-from .study import Study as Study, label_map as label_map, run_study as run_study, study as study
+from .store import Store as Store, Study as Study, open_study as open_study
+from .study import label_map as label_map, run_study as run_study, study as study
 
 
 check_layer(globals(), "label_map open_study study sweep")

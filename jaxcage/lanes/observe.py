@@ -75,6 +75,17 @@ class Observation(NamedTuple):
     """Position of the cage centre relative to its land, over the clearance, at each sample; only for models with
     averages."""
 
+    @classmethod
+    def pending(cls, model: AbstractForcedSystem, run: Run, count: int) -> "Observation":
+        """Results of lanes that have not been run: NaN, with the outcome of a failure."""
+        dim, beside = model.dimension, len(model.beside)
+        shapes: dict[str, tuple[int, ...]] = {"last": (dim,), "strobe": (run.keep, dim), "doubt": (run.exponents,)}
+        shapes |= {"growth": (run.followed, run.exponents), "integrals": (run.blocks, beside)}
+        shapes |= {"largest": (run.blocks, len(model.watched) - 1)}
+        shapes |= {"place": (run.revolutions * model.samples if beside else 0, 2)}
+        numbers = (np.full((count, *shapes.get(name, ())), np.nan) for name in cls._fields[1:])
+        return cls(np.full(count, NOT_FINITE, dtype=np.int32), *numbers)
+
     def put(self, lanes: Int[np.ndarray, " some"], new: "Observation") -> None:
         """Replace the results of some lanes."""
         for mine, theirs in zip(self, new, strict=True):

@@ -1,55 +1,106 @@
 """Runs of lanes: from a plan and settings to one data set."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from jaxtyping import Float
+from jaxtyping import Float, Shaped
 
 from .._arguments import require_x64
+from .._errors import ArgumentError, Stop
 from ..analysis import label_lanes, motion_label
 from ..models import INSTEAD, AbstractForcedSystem, require_known
-from ..solve import FINISHED, INACCURATE
+from ..solve import FINISHED, INACCURATE, WIDTH, cores
 from .confirm import Labelled, confirm
 from .dataset import dataset, exponent_error
+from .grid import Grid
 from .horizon import follow, run_unsettled
 from .observe import Observation, Progress, observe
-from .plan import Plan, Speeds, States
+from .plan import SPEED, Plan, Speeds, States
 from .settings import Run
+from .store import Store, Study
 
 
-def run_lanes(plan: Plan, run: Run, progress: Progress | None = None) -> xr.Dataset:
+PARTS = 4
+"""Number of parts of a run, each run to its end before the next begins, if no store keeps finished lanes."""
+
+
+def run_lanes(plan: Plan, run: Run, progress: Progress | None = None, store: Store | None = None) -> xr.Dataset:
     """Run the lanes of a plan.
 
-    **Arguments:** plan; settings (`Run.of`); function called with the numbers of finished lanes and of all lanes.
+    **Arguments:** plan; settings (`Run.of`); function called with the numbers of finished lanes and of all lanes, which
+    may raise `Stop`; store of observations of these lanes, which are run only if they are not in it.
 
     **Returns:** a data set over the axes of the plan, described in `lanes.dataset`. Lanes that fail are NaN with an
-    outcome and do not affect others.
-    """
-    scale = plan.scale
+    outcome and do not affect others. After a `Stop` it is the part along the first axis that is finished, with labels
+    that may not be confirmed.
 
-    def onward(run: Run, some: np.ndarray, y: Float[np.ndarray, "some dim"] | None, **more: Any) -> Observation:
+    **Raises:** `Stop` if no part is finished.
+    """
+    scale, count, several = plan.scale, len(plan.states), plan.model.samples > 1
+    seen, rounds, escape, end, done = Observation.pending(plan.model, run, count), [], None, 0, 0
+    finished = seen
+
+    def onward(run: Run, some: np.ndarray, y: Any, progress: Progress | None = progress, **more: Any) -> Observation:
         begin = plan.states[some] if y is None else y
         return observe(plan.lanes.at(some), run, begin, progress, onward=y is not None, **more)
 
-    seen = run_unsettled(run, scale, onward) if run.settled else onward(run, np.arange(len(scale)), None)
-    if plan.model.samples > 1:
-        lost = ~np.isin(seen.outcome, (FINISHED, INACCURATE))
-        label = np.where(lost, "failed", np.array([motion_label(x, plan.model.samples) for x in seen.place]))
-        return dataset(plan, run, seen, scale, label)
-    rounds, escape, end = [], None, 0
-    if run.exponents and run.blocks > 1:  # without an error of the exponent no lane is labelled chaotic
-        if run.confirm:
+    def begun(some: np.ndarray) -> Observation:
+        told = lambda part, of: progress and progress(done + part * some.size // of, count)
+        told(0, 1)
+        first = lambda run, few, y: onward(run, some[few], y, told)
+        return run_unsettled(run, scale[some], first) if run.settled else first(run, np.arange(some.size), None)
 
-            def again(lanes: np.ndarray, times: int) -> Labelled:
-                seen.put(lanes, onward(run, lanes, None, method=run.method.finer(times)))
-                return _labelled(seen.at(lanes), scale[lanes])
+    def again(lanes: np.ndarray, times: int) -> Labelled:
+        seen.put(lanes, onward(run, lanes, None, method=run.method.finer(times)))
+        return _labelled(seen.at(lanes), scale[lanes])
 
-            rounds = confirm(_labelled(seen, scale), plan.shape, again)
-        if run.horizon > run.discard + run.revolutions:
-            escape, end = follow(_labelled(seen, scale).label, seen, run, scale, onward)
-    return dataset(plan, run, seen, scale, _labelled(seen, scale).label, rounds, escape, end)
+    try:
+        size = max(-(-count // PARTS), WIDTH * cores())
+        chunks = range(0, count, size) if store is None else range(store.study.grid.chunks)
+        for chunk in chunks:
+            if store is None:
+                some = np.arange(chunk, min(chunk + chunks.step, count))
+                seen.put(some, begun(some))
+            else:
+                some = store.study.grid.lanes_of(chunk)
+                seen.put(some, _stored(store, chunk, lambda some=some: begun(some)))
+            done += some.size
+        finished = Observation(*map(np.copy, seen))
+        if not several and run.exponents and run.blocks > 1:  # without an error of the exponent nothing is chaotic
+            if run.confirm:
+                rounds = confirm(_labelled(seen, scale), plan.shape, again)
+                finished = Observation(*map(np.copy, seen))
+            if run.horizon > run.discard + run.revolutions:
+                escape, end = follow(_labelled(seen, scale).label, seen, run, scale, onward)
+        finished = seen
+    except Stop:
+        if not (whole := done * plan.shape[0] // count):
+            raise
+    else:
+        whole = plan.shape[0]
+    label = _motions(finished, plan.model.samples) if several else _labelled(finished, scale).label
+    found = dataset(plan, run, finished, scale, label, rounds, escape, end)
+    return found if whole == plan.shape[0] else found.isel({next(iter(plan.axes)): slice(whole)})
+
+
+def _stored(store: Store, chunk: int, run: Callable[[], Observation]) -> Observation:
+    """Observation of a chunk of lanes, from the store or, if it is not there, from a run that is then stored."""
+    study = store.study
+    if store.pending([chunk]):
+        seen = run()
+        store.write(chunk, {name: x for name, x in seen._asdict().items() if name in study.variables})
+        return seen
+    blank = Observation.pending(study.model, study.run, study.grid.lanes_of(chunk).size)
+    return blank._replace(**{n: x.astype(getattr(blank, n).dtype) for n, x in store.read(chunk).items()})
+
+
+def _motions(seen: Observation, samples: int) -> Shaped[np.ndarray, " lanes"]:
+    """Kinds of motion of the cage among its rollers."""
+    lost = ~np.isin(seen.outcome, (FINISHED, INACCURATE))
+    return np.where(lost, "failed", np.array([motion_label(x, samples) for x in seen.place]))
 
 
 def _labelled(seen: Observation, scale: Float[np.ndarray, "lanes dim"]) -> Labelled:
@@ -66,6 +117,7 @@ def sweep(
     *,
     initial_states: States = None,
     progress: Progress | None = None,
+    store: str | Path | None = None,
     **settings: Any,
 ) -> xr.Dataset:
     """Run a model over speed from several initial states: strobe states, Lyapunov exponents and labels; for a whole
@@ -78,7 +130,10 @@ def sweep(
         converts them from rpm.
     - `initial_states`: initial states, each a tuple of numbers; an array with states for each speed; or the number of
         the model's own initial states to use, by default all.
-    - `progress`: function called with the numbers of finished lanes and of all lanes.
+    - `progress`: function called with the numbers of finished lanes and of all lanes. If it raises
+        `jaxcage.lanes.Stop`, the speeds that are finished are returned.
+    - `store`: folder that keeps finished lanes, from which the same call goes on if this one does not come to its end;
+        for one model, from its own initial states.
     - `settings`: fields of `jaxcage.lanes.Run`, such as `discard`, `revolutions`, `blocks`, `exponents`, `confirm`,
         `horizon` and `method`; or the `tolerance` of machine code, relative to state and scale.
 
@@ -91,4 +146,10 @@ def sweep(
     require_x64()
     require_known("sweep", INSTEAD, model, speeds)
     plan = Plan.over_speed(model, speeds, initial_states)
-    return run_lanes(plan, Run.of(plan.model, **settings), progress)
+    run = Run.of(plan.model, **settings)
+    if store is None:
+        return run_lanes(plan, run, progress)
+    if isinstance(model, Sequence) or not isinstance(initial_states, int | None):
+        raise ArgumentError("store", said="goes with one model from its own initial states, but others were given.")
+    grid = Grid({SPEED: plan.coordinates[SPEED][1]}, {}, 0, 0, plan.shape[1], WIDTH * cores())
+    return run_lanes(plan, run, progress, Store(store, Study(model, grid, run, observations=True)))

@@ -15,27 +15,30 @@ import tempfile
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+import equinox as eqx
+import jax
 import numpy as np
 import xarray as xr
 
 from .._errors import ArgumentError, InputError
 from .._parameters import parameter_info
 from ..files import sync
+from ..models import AbstractForcedSystem
 from ..quantities import quantity
-from .dataset import configuration_of, decoded, flags, settings_of
-from .grid import OIL, SAMPLE
+from ..solve import OUTCOMES
+from .dataset import CODES, configuration_of, decoded, flags, settings_of
+from .grid import OIL, SAMPLE, Grid
+from .observe import Observation
 from .plan import SPEED
+from .settings import Run
 
-
-if TYPE_CHECKING:
-    from .study import Study
 
 FORMAT = 4
 """Version of the layout of stores."""
 Results = dict[str, np.ndarray]
-"""Results of a chunk by name, with its block of the grid as the first axes."""
+"""Results of the lanes of a chunk by name."""
 
 
 class Variable(NamedTuple):
@@ -43,16 +46,63 @@ class Variable(NamedTuple):
 
     text: str
     unit: str
-    exponents: bool = False
-    """True for one number per exponent."""
+    shape: tuple[int, ...] = ()
+    """Shape of the numbers of a lane; in a study, one for each exponent."""
     names: tuple[str, ...] = ()
     """Meanings of the codes 0, 1, ...; empty for numbers that are not codes."""
 
 
+SCALARS = ("peak", "error", "steps")
+"""Variables stored for every lane of any model."""
 KNOWN = "jaxcage jax jaxlib numpy diffrax equinox lineax optimistix builtins".split()
 """Packages whose code is identified by their versions."""
 OUTCOME = "outcome"
 """Variable that is written last: a chunk without it has never been finished."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Study:
+    """A model, the grid over which it is run, and the settings of the runs."""
+
+    model: AbstractForcedSystem
+    grid: Grid
+    run: Run
+    name: str = ""
+    version: str = ""
+    """Version of the user's own code `name`, which a store cannot recognise without these two."""
+    observations: bool = False
+    """True to store the observations of lanes, from which a sweep makes its data set, in place of their results."""
+
+    def __post_init__(self):
+        self.grid.require_known(self.model)
+
+    @property
+    def description(self) -> str:
+        """JSON by which a store recognises its study."""
+        run = {f.name: getattr(self.run, f.name) for f in dataclasses.fields(self.run) if f.name != "method"}
+        configured = configuration_of(self.model)
+        system = json.loads(configured["configuration"]) if configured else numbers_of(self.model)
+        about = {"name": self.name, "version": self.version, "system": system}
+        about |= {"observations": True} if self.observations else {}
+        method = {"method_numbers": numbers_of(self.run.method), **settings_of(self.run.method)}
+        return json.dumps({**about, "plan": self.grid.describe(), **run, **method}, sort_keys=True)
+
+    @property
+    def variables(self) -> dict[str, Variable]:
+        """Variables that are stored for every lane, by name."""
+        if self.observations:
+            blank = Observation.pending(self.model, self.run, 1)._asdict()
+            words = {"outcome": OUTCOMES}
+            return {n: Variable(n, "", x.shape[1:], words.get(n, ())) for n, x in blank.items() if x.size}
+        known, exponents = lambda name: (quantity(name).text, quantity(name).unit), (self.run.exponents,)
+        found = {name: Variable(*known(name)) for name in SCALARS}
+        if self.run.exponents:
+            found["exponents"] = Variable(*known("exponent"), exponents)
+            found["standard_error"] = Variable(*known("standard_error"), exponents)
+        for each in self.model.quantities:
+            found[each.name] = Variable(each.text, each.unit)
+            found[f"{each.name}_standard_error"] = Variable(f"standard error, {each.text}", each.unit)
+        return found | {name: Variable(*known(name), names=words) for name, words in CODES.items()}
 
 
 class Store:
@@ -62,7 +112,7 @@ class Store:
     own code without a name and a version.
     """
 
-    def __init__(self, path: str | Path, study: "Study"):
+    def __init__(self, path: str | Path, study: Study):
         self.path, self.study = Path(path), study
         if (own := _own_code([study.model, study.run.method])) and not (study.name and study.version):
             said = f"must be given, since a store cannot tell by itself whether your own {own} is still the same."
@@ -91,8 +141,15 @@ class Store:
 
     def _put(self, chunk: int, results: Results) -> None:
         region = self.study.grid.region(chunk)
+        shape = tuple(part.stop - part.start for part in region)
         for name in sorted(results, key=lambda name: name == OUTCOME):
-            self._arrays[name][region] = results[name]
+            self._arrays[name][region] = results[name].reshape(*shape, *results[name].shape[1:])
+
+    def read(self, chunk: int) -> Results:
+        """Results of a finished chunk."""
+        region, lanes = self.study.grid.region(chunk), self.study.grid.lanes_of(chunk).size
+        shapes = {name: (lanes, *variable.shape) for name, variable in self.study.variables.items()}
+        return {name: self._arrays[name][region].reshape(shape) for name, shape in shapes.items()}
 
     def tidy(self) -> None:
         """Remove temporary files of killed processes from a store to which nobody writes any more."""
@@ -174,7 +231,7 @@ def _going_on(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _same(path: Path, study: "Study") -> dict[str, Any]:
+def _same(path: Path, study: Study) -> dict[str, Any]:
     """Arrays of the store of this study. **Raises:** `ArgumentError` for another one; `InputError` for its format."""
     refused = "must be a new folder or the store of this study, but"
     try:
@@ -216,7 +273,7 @@ def _own_code(x: Any) -> str | None:
 # The empty store: its metadata depend on the study alone, byte for byte.
 
 
-def _create(path: Path, study: "Study") -> None:
+def _create(path: Path, study: Study) -> None:
     """Create an empty store in a temporary folder and rename it; if another process is faster, its store is kept."""
     path.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent))
@@ -231,7 +288,7 @@ def _create(path: Path, study: "Study") -> None:
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def _write(path: Path, study: "Study") -> None:
+def _write(path: Path, study: Study) -> None:
     import zarr
     from zarr.codecs import Crc32cCodec, ZstdCodec
 
@@ -242,7 +299,8 @@ def _write(path: Path, study: "Study") -> None:
     dataset.to_zarr(path, mode="w", consolidated=False, encoding=checked)
     group = zarr.open_group(path, mode="r+", zarr_format=3, use_consolidated=False)
     for name, variable in study.variables.items():
-        axes, extra = (("exponent",), (study.run.exponents,)) if variable.exponents else ((), ())
+        extra = variable.shape
+        axes = [f"{name}_{i}" for i in range(len(extra))] if study.observations else ["exponent"] * len(extra)
         group.create_array(
             name,
             shape=(*plan.shape, *extra),
@@ -258,7 +316,7 @@ def _write(path: Path, study: "Study") -> None:
         zarr.consolidate_metadata(path)
 
 
-def _coordinates(study: "Study") -> dict[str, Any]:
+def _coordinates(study: Study) -> dict[str, Any]:
     grid, info = study.grid, parameter_info(study.model)
 
     def words(name: str) -> dict[str, str]:
@@ -276,7 +334,7 @@ def _coordinates(study: "Study") -> dict[str, Any]:
     return found | {"rpm": (dims, speed * 30 / np.pi, about | {"units": "rpm"}), "exponent": exponents}
 
 
-def _attributes(study: "Study") -> dict[str, Any]:
+def _attributes(study: Study) -> dict[str, Any]:
     return {
         "title": "jaxcage study",
         "store_format": FORMAT,
@@ -287,3 +345,10 @@ def _attributes(study: "Study") -> dict[str, Any]:
         **configuration_of(study.model),
         **{name: text for name, text in settings_of(study.run.method).items() if name.startswith("version_")},
     }
+
+
+def numbers_of(module: eqx.Module) -> dict[str, Any]:
+    """Numbers of a module by their paths."""
+    leaves, _ = jax.tree_util.tree_flatten_with_path(module)
+    named = lambda path: jax.tree_util.keystr(path).lstrip(".")
+    return {named(path): np.asarray(x).tolist() for path, x in leaves if eqx.is_array_like(x)}

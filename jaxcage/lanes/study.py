@@ -1,30 +1,28 @@
 """Studies: lanes over any parameters, computed chunk by chunk into a store, which an interrupted run can resume."""
 
+import contextlib
 import dataclasses
 import functools
-import json
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
-import jax
 import numpy as np
 import xarray as xr
 from jaxtyping import Array, Float
 
 from .._arguments import require_at_least, require_x64
-from .._errors import ArgumentError
+from .._errors import ArgumentError, Stop
 from ..analysis import LONGEST_PERIOD, scatter
 from ..models import AbstractForcedSystem, require_speeds
-from ..quantities import quantity
-from .dataset import CODES, coded, configuration_of, settings_of
+from .dataset import coded
 from .grid import LANES, Between, Grid
 from .observe import Progress
 from .plan import SPEED
 from .run import run_lanes
 from .settings import Run
-from .store import Results, Store, Variable, open_study
+from .store import Results, Store, Study, open_study
 
 
 CLOSING = 2 * LONGEST_PERIOD
@@ -35,54 +33,6 @@ Vary = Mapping[str, Float[Array, " values"] | Float[np.ndarray, " values"] | Bet
 """Mapping of parameter names, `"speed"` or `"oil"` to values [SI], an axis of the grid, or to a distribution."""
 Shard = tuple[int, int]
 """Part (i, n): the i-th of n parts, counted from 1."""
-SCALARS = ("peak", "error", "steps")
-"""Variables stored for every lane of any model."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Study:
-    """A model, the grid over which it is run, and the settings of the runs."""
-
-    model: AbstractForcedSystem
-    grid: Grid
-    run: Run
-    name: str = ""
-    version: str = ""
-    """Version of the user's own code `name`, which a store cannot recognise without these two."""
-
-    def __post_init__(self):
-        self.grid.require_known(self.model)
-
-    @property
-    def description(self) -> str:
-        """JSON by which a store recognises its study."""
-        run = {f.name: getattr(self.run, f.name) for f in dataclasses.fields(self.run) if f.name != "method"}
-        configured = configuration_of(self.model)
-        system = json.loads(configured["configuration"]) if configured else numbers_of(self.model)
-        about = {"name": self.name, "version": self.version, "system": system}
-        method = {"method_numbers": numbers_of(self.run.method), **settings_of(self.run.method)}
-        return json.dumps({**about, "plan": self.grid.describe(), **run, **method}, sort_keys=True)
-
-    @property
-    def variables(self) -> dict[str, Variable]:
-        """Variables that are stored for every lane, by name."""
-        known = lambda name: (quantity(name).text, quantity(name).unit)
-        found = {name: Variable(*known(name)) for name in SCALARS}
-        if self.run.exponents:
-            found["exponents"] = Variable(*known("exponent"), exponents=True)
-            found["standard_error"] = Variable(*known("standard_error"), exponents=True)
-        for each in self.model.quantities:
-            found[each.name] = Variable(each.text, each.unit)
-            found[f"{each.name}_standard_error"] = Variable(f"standard error, {each.text}", each.unit)
-        return found | {name: Variable(*known(name), names=words) for name, words in CODES.items()}
-
-    def chunk(self, number: int) -> Results:
-        """Compute the results of a chunk, in the shape of its block; a lane's bits do not depend on the chunk."""
-        found = coded(run_lanes(self.grid.plan(self.model, self.grid.lanes_of(number)), self.run))
-        values = {name: x.values for name, x in found.data_vars.items()}
-        values |= {f"{x.name}_standard_error": scatter(values[f"{x.name}_blocks"]) for x in self.model.quantities}
-        shape = tuple(part.stop - part.start for part in self.grid.region(number))
-        return {name: values[name].reshape(*shape, *values[name].shape[1:]) for name in self.variables}
 
 
 def study(
@@ -115,7 +65,8 @@ def study(
     - `initial_states`: number of the model's own initial states to run at each point, by default all.
     - `lanes`: maximum number of lanes per chunk; by default 2048, or fewer for models with expensive lanes.
     - `shard`: (i, n) runs every n-th chunk from the i-th on. All shards write to the same folder.
-    - `progress`: function called with the numbers of finished and of all lanes, including those already stored.
+    - `progress`: function called with the numbers of finished and of all lanes, including those already stored. If it
+        raises `jaxcage.lanes.Stop`, the results so far are returned.
     - `name`, `version`: name and version of your own code, required if the model contains a function or class of your
         own, since a store cannot detect that it has changed: change the version whenever the code changes.
     - `settings`: fields of `jaxcage.lanes.Run`; lanes are neither confirmed nor followed to a horizon.
@@ -131,8 +82,20 @@ def study(
     most = lanes or (LANES if model.samples == 1 else LANES // 42)
     run = Run.of(model, **{"keep": CLOSING, **settings, "confirm": False, "horizon": 0})
     about = Study(model, Grid(axes, sampled, samples, seed, own, most), run, name, version)
-    run_study(about, store, shard, progress)
+    with contextlib.suppress(Stop):
+        run_study(about, store, shard, progress)
     return open_study(store)
+
+
+def _chunk(about: Study, number: int, progress: Progress) -> Results:
+    """Compute the results of a chunk; a lane's bits do not depend on the chunk."""
+    lanes, model = about.grid.lanes_of(number), about.model
+    found = coded(run_lanes(about.grid.plan(model, lanes), about.run, progress))
+    if found.sizes["lane"] < lanes.size:
+        raise Stop
+    values = {name: x.values for name, x in found.data_vars.items()}
+    values |= {f"{x.name}_standard_error": scatter(values[f"{x.name}_blocks"]) for x in model.quantities}
+    return {name: values[name] for name in about.variables}
 
 
 def run_study(
@@ -152,7 +115,13 @@ def run_study(
     total, left = lanes(part), lanes(pending)
     report(total - left, total)
     for chunk in pending:
-        store.write(chunk, about.chunk(chunk))
+        begun, done = time.monotonic(), total - left
+
+        def ask(*_: int, begun: float = begun, done: int = done) -> None:
+            if time.monotonic() > begun + 1:  # so that `progress` can stop a long chunk
+                report(done, total)
+
+        store.write(chunk, _chunk(about, chunk, ask))
         left -= lanes([chunk])
         report(total - left, total)
     if not store.pending():
@@ -218,10 +187,3 @@ def label_map(
         for name, all_lanes in found.data_vars.items():
             all_lanes.values.reshape(grid.size, *all_lanes.shape[len(grid.shape) :])[again] = later[name].values
     return found if speed is None else found.isel({SPEED: 0})
-
-
-def numbers_of(module: eqx.Module) -> dict[str, Any]:
-    """Numbers of a module by their paths."""
-    leaves, _ = jax.tree_util.tree_flatten_with_path(module)
-    named = lambda path: jax.tree_util.keystr(path).lstrip(".")
-    return {named(path): np.asarray(x).tolist() for path, x in leaves if eqx.is_array_like(x)}

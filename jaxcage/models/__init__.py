@@ -55,7 +55,6 @@ from .contacts import (
     Pockets as Pockets,
     Raceways as Raceways,
     Traction as Traction,
-    bar_stiffness as bar_stiffness,
 )
 from .field import (
     AbstractField as AbstractField,

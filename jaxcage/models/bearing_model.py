@@ -19,7 +19,8 @@ from ..bearing import (
     STARVATION,
     Bearing,
     Lubricant,
-    brass,
+    bar_stiffness,
+    cage_material,
     cylinder_drag_coefficient,
     line_contact_approach,
     line_contact_load,
@@ -41,7 +42,6 @@ from .contacts import (
     Raceways,
     RollerDrag,
     Traction,
-    bar_stiffness,
 )
 from .protocol import AbstractForcedSystem, StepLimits
 
@@ -410,7 +410,7 @@ def nu2310_bearing() -> BearingModel:
         lubricant=vg(56.0),
         film=RibFilm(land_width=4e-3),
         contact=LandContact(stiffness=1e9, onset=0.97, restitution=0.9),
-        pockets=Pockets(pocket_stiffness=bar_stiffness(brass().youngs_modulus, 27e-3, 3e-3, 8.3e-3)),
+        pockets=Pockets(pocket_stiffness=bar_stiffness(cage_material("brass").youngs_modulus, 27e-3, 3e-3, 8.3e-3)),
         cage_mass=mass,
         cage_inertia=mass * (inner**2 + outer**2) / 2,
         guidance_gap=0.45e-3,

@@ -160,22 +160,6 @@ def saturated(sliding: Scalar, speed: Scalar) -> Array:
     return sliding * inverse_root(sliding * sliding + speed * speed)
 
 
-def bar_stiffness(
-    youngs_modulus: Scalar, length: Scalar, thickness: Scalar, height: Scalar, contact_stiffness: Scalar = jnp.inf
-) -> Array:
-    """Stiffness of a bar that is clamped at both ends and loaded evenly, in series with its contact.
-
-    At mid-span 384 E I/l^3 with I = height thickness^3/12 (S. Timoshenko, *Strength of Materials*, part I).
-
-    **Arguments:** modulus [Pa]; free length, thickness along the circumference and radial height [m]; secant stiffness
-    of the line contact [N/m].
-
-    **Returns:** stiffness [N/m].
-    """
-    bending = 32 * youngs_modulus * height * (thickness / length) ** 3
-    return jnp.asarray(1 / (1 / bending + 1 / contact_stiffness))
-
-
 class RollerDrag(eqx.Module):
     """Drag, churning and rolling resistance of rollers, none by default; `bearing.oil_drag` has the laws."""
 

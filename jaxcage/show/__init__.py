@@ -122,6 +122,8 @@ from .verdict_tables import (
     MOTIONS as MOTIONS,
     cage_verdict as cage_verdict,
     changes_table as changes_table,
+    forces_note as forces_note,
+    forces_table as forces_table,
     indices_note as indices_note,
     indices_table as indices_table,
     margin_sentence as margin_sentence,

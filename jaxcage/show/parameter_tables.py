@@ -15,6 +15,11 @@ from .tables import OWN, UNIT, Column, Table, table as table_of
 SHOWN = {"m^2/s": ("mm²/s", 1e6, 0.0), "K": ("°C", 1.0, -273.15), "Pa": ("GPa", 1e-9, 0.0), "1": ("", 1.0, 0.0)}
 """Display unit of a parameter, factor from SI, and offset."""
 READY_MADE = {("bearing", "designation"): "catalogue, {}", ("lubricant", "grade"): "grade {}"}
+BY_MATERIAL = {
+    *(("cage_mass",), ("cage_inertia",), ("impact", "cage_modulus")),
+    *(("pockets", "pocket_stiffness"), ("pockets", "pocket_friction")),
+}
+"""Paths of parameters that follow from the material of the cage."""
 PUBLISHED = {
     ("bearing", "inner_raceway_diameter"): "catalogue",
     ("bearing", "palmgren_constant"): "default",
@@ -82,6 +87,8 @@ def _in_file(path: tuple[str, ...], table: Mapping[str, Any]) -> str:
         here = part.get("stiffness")
     if here is not None:
         return "best guess in a range of this file" if isinstance(here, str) and is_range(here) else "this file"
+    if "material" in table and path in BY_MATERIAL:
+        return f"material {table['material']}"
     for (made, key), words in READY_MADE.items():
         if path[0] == made and isinstance(part, Mapping) and key in part:
             if key == "designation" and path[-1] in estimated(designated(part[key])):

@@ -1,13 +1,14 @@
 """Verdict on an operating range: its sentence, what would decide it, and what to change first."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from .._parameters import parameter_info
+from ..analysis import ONE_ROLLER
 from ..bearing import listed_like, static_load_rating
 from ..design import Checked, Index, Margins, RangeChance
 from .tables import OWN, UNIT, Beside, Column, Table, speed_columns, table
@@ -83,6 +84,24 @@ def changes_table(model: Any, found: Margins) -> Table:
     columns.append(Column(f"adds to {end} margin [%]", "gain", digits=2))
     columns += [Column(f"to {other} margin [%]", "other", digits=2), Column("may reach", "limit", OWN)]
     return table("What to change first, at first order", rows, columns, "changes")
+
+
+def forces_table(found: Mapping[str, Mapping[str, float]]) -> Table:
+    """Table of the largest size of each force on the cage [N] at some speeds, from these by speed in words."""
+    names = dict.fromkeys(name for forces in found.values() for name in forces)
+    rows = [{"force on the cage": name} | {at: forces[name] for at, forces in found.items()} for name in names]
+    columns = ["force on the cage", *(Column(f"at {at}", at, "N") for at in found)]
+    return table("Largest forces on the cage at the best guess", rows, columns, "forces")
+
+
+def forces_note(found: Mapping[str, Mapping[str, float]], unknown: Sequence[str]) -> str:
+    """Note on the largest lasting force at the last speed, with the names of the unknown values that decide it."""
+    at, forces = list(found.items())[-1]
+    lasting = [name for name in forces if name != ONE_ROLLER]
+    first, second, *_ = sorted(lasting, key=lambda name: np.nan_to_num(forces[name]), reverse=True)
+    said = f"Largest force on the cage at {at}: {first}, {forces[first] / forces[second]:.2g} times the next, {second}"
+    by = [label for label in unknown if label.startswith(f"{first}.")]
+    return f"{said}; unknown about it: {', '.join(by)}" if by else said
 
 
 def indices_table(rows: Sequence[Index]) -> Table:

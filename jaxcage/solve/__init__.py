@@ -25,6 +25,7 @@ from .._arguments import check_layer
 from .engine import (
     RETRIES as RETRIES,
     SURE as SURE,
+    WIDTH as WIDTH,
     Engine as Engine,
     Lanes as Lanes,
     cores as cores,

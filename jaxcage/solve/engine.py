@@ -113,14 +113,14 @@ class Engine:
         tangents: Float[np.ndarray, "lanes tangents dim"] | None = None,
         step: Float[np.ndarray, " lanes"] | float | None = None,
         threads: int = 1,
-        report: Callable[[int], None] = lambda done: None,
+        report: Callable[[float], None] = lambda done: None,
     ) -> March:
         """Run lanes from states in units of their scales, followed by the values of additional integrands.
 
         **Arguments:** numbers of the lanes; states; number of strobe states to run, and to keep; a method with a
         tolerance; `begin`, index of the first state among the samples of a revolution; `turn`, phase from strobe to
         strobe if it is not a revolution over its samples; tangent vectors in units of the scale; first step, NaN for
-        the default; number of threads; function called with the number of finished lanes. `begin`, `turn` and `step`
+        the default; number of threads; function called with the work done, in lanes. `begin`, `turn` and `step`
         hold for all lanes or are arrays over lanes.
         """
         lanes, field, rows = len(state), self.field, self._rows
@@ -142,7 +142,7 @@ class Engine:
         stored = np.zeros((rows["mark"].stop, lanes))
         strobe = np.full((lanes, keep, field.recorded), np.nan)
         growth = np.full((lanes, strobes, field.tangents), np.nan)
-        queue = np.zeros(2, dtype=np.int64)
+        queue = np.zeros(3, dtype=np.int64)
         settings = np.array([method.tolerance, limits.longest, limits.shortest, most])
         arrays = (queue, settings, np.append(numbers.shared, 0.0), loaded, stored, strobe, growth)
         at = [x.ctypes.data for x in arrays]
@@ -150,7 +150,7 @@ class Engine:
         width = 1 if field.excursion is None and lanes == 1 else WIDTH
         march = self._compiled(width)
         run = lambda: march(at[0], lanes, strobes, keep, *at[1:])
-        _run_threads(run, min(threads, -(-lanes // width)), queue, lambda: report(min(int(queue[0]), lanes)))
+        _run_threads(run, min(threads, -(-lanes // width)), queue, lambda: report(int(queue[2]) / strobes))
         part = lambda name: stored[rows[name][0]]
         turned = np.roll(strobe, -strobes % keep, axis=1)  # the latest last
         numbers_of, peaks = n + field.beside, part("peak")[:, None, None]
@@ -172,7 +172,7 @@ class Engine:
 
 
 def _run_threads(run: Callable[[], None], count: int, queue: np.ndarray, report: Callable[[], None]) -> None:
-    """Run `run` in `count` threads; Ctrl-C sets the flag in `queue`, which stops them."""
+    """Run `run` in `count` threads; an exception, also one of `report`, sets the flag in `queue`, which stops them."""
     with concurrent.futures.ThreadPoolExecutor(count) as pool:
         try:
             left = {pool.submit(run) for _ in range(count)}

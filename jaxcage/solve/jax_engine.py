@@ -100,7 +100,7 @@ class JaxEngine:
         tangents: Float[np.ndarray, "lanes tangents dim"] | None = None,
         step: Any = None,
         threads: int = 1,
-        report: Callable[[int], None] = lambda done: None,
+        report: Callable[[float], None] = lambda done: None,
     ) -> March:
         """Run lanes like `Engine`, but with the first step chosen by the solver."""
         own, shared = numbers
@@ -132,6 +132,6 @@ class JaxEngine:
                 y[alive], strobe[alive, k % keep] = y1, y1
                 if m and alive.size:
                     t[alive], growth[alive, k] = _orthonormalised(t1)
-                report(int(lanes * (k + 1) / strobes))
+                report(lanes * (k + 1) / strobes)
         latest_last, none = np.roll(strobe, -strobes % keep, axis=1), np.zeros(lanes)
         return March(y, t, none, peaks[:, None, None], none, outcome, latest_last, growth)

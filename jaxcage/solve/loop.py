@@ -22,9 +22,10 @@ def march_ir(field: Field, pair: str, width: int) -> str:
     """Module of a system, whose function `march` runs the lanes of a queue until it is empty.
 
     `march(queue, lanes, revolutions, keep, settings, shared, loaded, stored, strobe, growth)`: queue holds the next
-    lane and a stop flag; settings are tolerance, largest step, smallest step, maximum number of steps per revolution;
-    loaded and stored have a row of all lanes for each of the first rows of `layout_of`; strobe is (lanes, keep,
-    recorded), a ring buffer; growth is (lanes, revolutions, tangents), squared lengths.
+    lane, a stop flag, and the number of strobe states reached; settings are tolerance, largest step, smallest step,
+    maximum number of steps per revolution; loaded and stored have a row of all lanes for each of the first rows of
+    `layout_of`; strobe is (lanes, keep, recorded), a ring buffer; growth is (lanes, revolutions, tangents),
+    squared lengths.
     """
     tableau = Tableau.named(pair)
     rows = layout_of(field, len(tableau.phase))
@@ -155,6 +156,18 @@ return:
 """Function that stores lanes that have ended and loads lanes of the queue; true if any lane is left."""
 
 
+STROBES_COUNTED = """%bits = bitcast {over} to i{width}
+  %bits_wide = zext i{width} %bits to i64
+  %reached = call i64 @llvm.ctpop.i64(i64 %bits_wide)
+  %counted_at = getelementptr i64, ptr %queue, i64 2
+  %counted = atomicrmw add ptr %counted_at, i64 %reached monotonic
+  %flag_at = getelementptr i64, ptr %queue, i64 1
+  %flag = load atomic volatile i64, ptr %flag_at monotonic, align 8
+  %stops = icmp ne i64 %flag, 0
+  br i1 %stops, label %return, label %record"""
+"""Code that counts the strobe states that were reached, and returns if the stop flag is set."""
+
+
 def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str, set[str]]:
     """Code for the steps of a vector of lanes, with their control."""
     w = Code(width)
@@ -267,6 +280,9 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     w.line(f"br i1 {w.any(over).text}, label %over, label %check")
 
     w.line("over:")
+    w.line(STROBES_COUNTED.format(over=w.typed(over), width=width))
+    w.line("record:")
+    w.declarations.add("declare i64 @llvm.ctpop.i64(i64)")
     revolution = w.get(row["revolution"])
     ring = w.sub(revolution, w.mul(kept, w.call("floor", w.div(w.add(revolution, number(0.5)), kept))))
     recorded = number(float(field.recorded))

@@ -12,7 +12,7 @@ import jaxcage as jc
 from jaxcage.files import configuration
 
 from ._land import Number, land_force
-from ._pulses import train
+from ._pulses import from_bearing, train
 from ._statics import half_angle, hunt_crossley_number, viscosity
 
 
@@ -56,6 +56,8 @@ class Field:
                 impact["amplitude"] * (omega / impact["reference_speed"]) ** impact["exponent"],
                 None,
             )
+        elif impact["kind"] == "from_bearing":
+            self.push, self.train = from_bearing(given, omega), None
         else:
             self.train = train(given, omega, half_angle(given["bearing"], given["load"]))
             self.orders = 1j * given["bearing"]["n_rollers"] * np.arange(self.train.shape[1])

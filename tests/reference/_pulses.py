@@ -7,6 +7,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from ._statics import half_angle
+
 
 PANELS, NODES = 48, 12
 
@@ -120,3 +122,32 @@ def train(given: dict[str, Any], omega: float, zone: float) -> np.ndarray:
         along = np.array([-math.sin(angle), math.cos(angle)])
         total += sign * along[:, None] * spectrum * np.exp(-1j * order * angle)
     return total
+
+
+def from_bearing(given: dict[str, Any], omega: float) -> float:
+    """Amplitude [N] of a roller and half a ring's mass that meet on a bar, once in a revolution, by integration."""
+    bearing, impact = given["bearing"], given["impact"]
+    length, across, soft = bearing["roller_length"], bearing["roller_diameter"], impact["cage_modulus"]
+    thick = math.pi * (bearing["inner_raceway_diameter"] + across) / bearing["n_rollers"]
+    thick, high = thick - across - bearing["pocket_clearance"], 0.52 * across
+    second = high * thick**3 / 12
+    sag = length**3 / (384 * soft * second) + length / (8 * 5 / 6 * soft / 2.6 * high * thick)
+    hard = bearing["roller_material"]["youngs_modulus"]
+    constant = bearing["palmgren_constant"] * 2 / (1 + hard / soft)
+    bar = 1 / (sag + 1 / (constant * length ** (8 / 9) * 1e-6 ** (1 / 9)))
+    roller = bearing["roller_material"]["density"] * math.pi * across**2 / 4 * length
+    speed = impact["approach_ratio"] * omega * bearing["pocket_clearance"]
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        push = bar * (y[0] - y[1])
+        phase = np.exp(1j * omega * t) * push
+        return [y[2], y[3], -push / roller, push / (given["cage_mass"] / 2), phase.real, phase.imag]
+
+    def apart(t: float, y: np.ndarray) -> float:
+        return y[0] - y[1]
+
+    apart.terminal, apart.direction = True, -1  # pyright: ignore[reportFunctionMemberAccess]
+    fast = math.sqrt(roller / bar)
+    done = solve_ivp(rates, (0, 5 * fast), [0, 0, speed, 0, 0, 0], "DOP853", events=apart, rtol=1e-12, atol=1e-15)
+    once = omega / math.pi * math.hypot(*done.y[4:, -1])
+    return 2 * impact["unmatched"] * math.cos(half_angle(bearing, given["load"])) * once
