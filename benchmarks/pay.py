@@ -1,13 +1,14 @@
 """Designs with and without gradients: `python -m benchmarks.pay [--case 1a] [--seeds 3]`.
 
 The problem is that of `jc.design_for`: the lowest cost of a cage that is stable over an operating range, with a margin
-of 10 % at both ends, in eight variables. The search of `design_for` has exact derivatives. Three others have none and
-minimise cost over that of the given design, plus 10 times what the worst requirement falls short: CMA-ES, differential
-evolution, and the package's surrogate. A trial is the same for all: edges are followed from the nearest known design. A
-trial at which an edge is lost falls short by 10.
+of 10 % at both ends, in eight variables. For the NU1014 a disturbance must also fall to 1/e within 3 revolutions, and
+the film take at most 350 W. The search of `design_for` has exact derivatives. Three others have none and minimise cost
+over that of the given design, plus 10 times what the worst requirement falls short: CMA-ES, the package's surrogate,
+and differential evolution. A trial is the same for all: edges are followed from the nearest known design. A trial at
+which an edge is lost falls short by 10.
 
 The search with derivatives begins at the given design (seed 0) and at quasi-random designs. The others have the given
-design among their first and may try 150. One of them ends as soon as it is within 1 % of the least cost in the ledger,
+design among their first and may try 60. One of them ends as soon as it is within 1 % of the least cost in the ledger,
 and is repeated if the ledger's least cost becomes lower. Processor time is that of the process and begins when the
 edges of the given design are known. The first search of a process also compiles its programs. Searches are kept in a
 ledger one by one: the same command goes on where it stopped, `--table` shows what there is.
@@ -38,13 +39,18 @@ from jaxcage.lanes import sobol
 
 
 LEDGER = pathlib.Path(__file__).parent / "pay.json"
-BUDGET, SEEDS, TOGETHER = 150, 5, 10
+BUDGET, SEEDS, TOGETHER = 60, 5, 10
 """Trials of a search, searches of each kind, and trials that CMA-ES and the surrogate ask for at a time."""
 WITHIN, OURS = 1.01, "with gradient"
 """A cost over the least known one at which a search has reached it, and the name of the search of `design_for`."""
-RANGES = {"1a": (12500, 18000), "2a": (12000, 18000), "3a": (12500, 18500), "spindle": (1785, 6246)}
+RANGES = {"1a": (12500, 18000), "2a": (12000, 18000), "3a": (12500, 18500)}
+RANGES |= {"spindle": (1785, 6246), "nu1014": (1778, 6222)}
 """Operating ranges [rpm of the cage]. Those of 1a to 3a take the calm speeds between two unstable ranges, and less
-than the margin is left at both ends of the given design. The spindle's is 4000 to 14000 rpm of its shaft."""
+than the margin is left at both ends of the given design. Spindle and NU1014, which nobody tuned, run at 4000 to 14000
+rpm of their shafts."""
+GAPS = {"spindle": (0.15e-3, 0.35e-3), "nu1014": (0.15e-3, 0.60e-3)}
+"""Bounds of the guidance gap [m]; 0.3 to 0.6 mm in the other cases."""
+KEEP = {"nu1014": Requirements(decay=3.0, drag=350.0)}
 OIL = 303.15, 353.15  # temperatures [K], which set the viscosity
 RELATIVE = {"land_width": (0.7, 1.5), "cage_mass": (0.8, 1.2), "rib_diameter": (0.98, 1.02), "amplitude": (0.7, 1.3)}
 RELATIVE |= {"stiffness": (0.5, 2.0)}
@@ -56,16 +62,16 @@ class Case:
     """A bearing with its operating range, requirements and cost."""
 
     def __init__(self, name: str):
-        spindle = name == "spindle"
-        model = read_bearing(LEDGER.parent / "spindle.toml").model if spindle else jc.case(name)
+        path, keep = LEDGER.with_name(f"{name}.toml"), KEEP.get(name, Requirements())
+        model = read_bearing(path).model if path.exists() else jc.case(name)
         now = {n: float(x) for n, x in jc.parameters(model).items()}
-        gap = (0.15e-3, 0.35e-3) if spindle else (0.30e-3, 0.60e-3)
+        gap = GAPS.get(name, (0.30e-3, 0.60e-3))
         vary = {"guidance_gap": gap, "eccentricity": (5e-6, now["eccentricity"]), "temperature": OIL}
         space = DesignSpace.of(model, vary | {n: (low * now[n], high * now[n]) for n, (low, high) in RELATIVE.items()})
         low, high = (rpm * np.pi / 30 for rpm in RANGES[name])
         self.own = space.place.clip(0, 1)
-        self.range = OperatingRange(space, (low, high), Requirements().margin)
-        self.rest = listed(Requirements(), model), cost_function(None, model), np.ones(self.own.size, bool), {}
+        self.range = OperatingRange(space, (low, high), keep.margin)
+        self.rest = listed(keep, model), cost_function(None, model), np.ones(self.own.size, bool), {}
         self.cost = self.problem().at(self.own).cost
 
     def problem(self) -> Problem:
@@ -166,28 +172,21 @@ def reached(run: dict[str, Any], least: float) -> tuple[float, float]:
 
 
 def table(ledger: Ledger) -> str:
-    """Medians over seeds for each case and search, and those of the best rival over ours."""
+    """Medians over seeds for each case and search."""
     parts: list[str] = []
     for case in dict.fromkeys(r["case"] for r in ledger):
         of, least, (low, high) = [r for r in ledger if r["case"] == case], least_cost(ledger, case), RANGES[case]
-        rows, medians = [["search", "seeds", "reached", "trials", "processor s", "least cost", "s a trial"]], {}
+        rows = [["search", "seeds", "reached", "trials", "processor s", "least cost"]]
         for kind in dict.fromkeys(r["search"] for r in of):
             runs = [r for r in of if r["search"] == kind]
             each = [reached(r, least) for r in runs]
-            at = medians[kind] = [float(np.sort(x)[len(x) // 2]) for x in zip(*each, strict=True)]
+            at = [float(np.sort(x)[len(x) // 2]) for x in zip(*each, strict=True)]
             costs = sorted(r["trace"][-1][2] if r["trace"] else np.inf for r in runs)
             shown = [f"{x:.0f}" if np.isfinite(x) else "never" for x in at]
             count = f"{sum(np.isfinite(x[0]) for x in each)} of {len(runs)}"
-            pace = sum(r["seconds"] for r in runs) / sum(r["evaluations"] for r in runs)
-            rows.append([kind, str(len(runs)), count, *shown, f"{costs[len(costs) // 2]:.4f}", f"{pace:.1f}"])
+            rows.append([kind, str(len(runs)), count, *shown, f"{costs[len(costs) // 2]:.4f}"])
         known = f"cost {of[0]['cost0']:.4f} as it is, least known {least:.4f}"
         parts.append(f"{case}, {low} to {high} rpm: {known}\n{columns(rows, right=True)}\n")
-        ours = medians.pop(OURS, [np.inf] * 2)
-        if medians and np.isfinite(ours[0]):
-            ratio = [min(m[i] for m in medians.values()) / ours[i] for i in (0, 1)]
-            known = f"{ratio[0]:.1f} in trials, {ratio[1]:.1f} in processor time"
-            known = known if np.isfinite(ratio[0]) else f"above {BUDGET / ours[0]:.1f} in trials"
-            parts[-1] += f"best rival over ours: {known}\n"
     return "\n".join(parts).rstrip()
 
 
@@ -202,8 +201,7 @@ def main() -> None:
     jc.keep_compiled_programs()
     ledger = json.loads(LEDGER.read_text(encoding="utf-8"))
     wanted = [(c, OURS, seed) for c in given.case for seed in range(given.seeds)]
-    wanted += [(c, k, seed) for seed in range(given.seeds) for c in given.case for k in KINDS if k != OURS]
-    wanted.sort(key=lambda w: (w[2] if w[1] != OURS else 0, given.case.index(w[0])))
+    wanted += [(c, k, seed) for seed in range(given.seeds) for k in KINDS for c in given.case if k != OURS]
     of = functools.cache(Case)
     for case, kind, seed in wanted if not given.table else ():
         least, this = least_cost(ledger, case), (case, kind, seed)

@@ -271,6 +271,14 @@ def test_an_unstable_range_that_is_born_stops_the_search_there():
     assert set(found.prices) == {"no unstable speeds between"}
 
 
+def test_a_search_goes_on_beyond_an_unstable_range():
+    """From x - sqrt(d) to x + sqrt(d), born at d = 0 in the operating range; then x moves it above the margin."""
+    begin, reward = window(x=1.15, y=0.0, d=-0.04, k=-0.5), lambda system: 1 - 10 * system.rates.d
+    found = jc.design_for(begin, (0.8, 1.2), {"x": (0.9, 2.0), "d": (-0.05, 0.05)}, KEEP, reward, check=0)
+    assert found.feasible and found.values["d"] == pytest.approx(0.05, abs=1e-4) and found.notes
+    assert found.values["x"] >= 1.32 + np.sqrt(found.values["d"]) - 1e-3
+
+
 REFUSED = [
     (dict(operating=(2.0, 1.2)), "`operating` must be two positive speeds, ascending, but are 2 and 1.2"),
     (dict(vary={"z": (0.0, 1.0)}), "`z` must be a parameter of the design: x, y, d, k, s, r"),

@@ -154,7 +154,7 @@ def test_loads_of_the_land_are_those_of_a_time_history():
     found = jc.design.Runs(jc.rpm(9000, 27500, 2), initial_states=2, discard=60, revolutions=20, method=method).run(
         models
     )
-    got, last, touched = jc.design.land_loads(models, found, method), found["last"].values, 0
+    got, last, touched = jc.analysis.land_loads(models, found, method), found["last"].values, 0
     for lane in np.ndindex(*last.shape[:-1]):
         model, speed = models[lane[0]], float(found["speed"][lane[1]])
         run = jc.simulate(model, speed, start=tuple(last[lane]), revolutions=4, samples=1024, method=fine)

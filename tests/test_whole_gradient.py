@@ -66,7 +66,7 @@ def test_a_rattling_bearing_by_differences():
         for name in ("friction_power_W", "land_impulse_N_s", "pocket_impulse_N_s"):
             each = found.statistics[name]
             change = ends[name].values[:, 0].T @ [1, -1] / 0.2
-            error = np.hypot(change.std(ddof=1) / np.sqrt(change.size), each.by_relative_change_error[0])
+            error = np.hypot(change.std(ddof=1) / np.sqrt(change.size), each.change("guidance_gap")[1])
             assert abs(each.by_relative_change[0] - change.mean()) < 4 * error
         power = found.statistics["friction_power_W"]
         assert power.elasticity[0] < -10 * power.elasticity_error[0] < 0  # a wider gap drags less: known with its sign
@@ -84,7 +84,7 @@ def test_errors_are_those_of_noise():
         noise = 0.02 * loud[None, :, None] * rng.normal(size=(2, pairs, 2))
         found.append(gradient_of_pairs("x", "1", ("a", "b", "c"), moved, sides[..., None] + noise))
     slopes = np.array([each.by_relative_change for each in found])
-    errors = np.array([each.by_relative_change_error for each in found])
+    errors = np.array([[each.change(name)[1] for name in "abc"] for each in found])
     np.testing.assert_allclose(slopes.mean(axis=0), true, atol=4 * slopes.std() / 20)
     np.testing.assert_allclose(errors.mean(axis=0), slopes.std(axis=0), rtol=0.12)
     assert np.mean(np.abs(slopes - true) < 2 * errors) == pytest.approx(0.94, abs=0.03)

@@ -10,6 +10,7 @@
 | `spectra`     | amplitude spectra by order of speed                                                  |
 | `rollers`     | rollers of a whole bearing around its circumference; spectra with named lines        |
 | `measures`    | whirl ratio, displacement, film, forces, impulse, drag of a motion                   |
+| `loads`       | loads of the guiding land, size and whirl of the motion, after a sweep               |
 """
 
 from .._arguments import check_layer
@@ -28,6 +29,7 @@ from .labels import (
     scatter as scatter,
     too_few_revolutions as too_few_revolutions,
 )
+from .loads import LAND_LOADS as LAND_LOADS, land_loads as land_loads, land_reading as land_reading, motions as motions
 from .measures import (
     ONE_ROLLER as ONE_ROLLER,
     Measured as Measured,

@@ -81,7 +81,7 @@ def design(
         ends = runs.speed[0] * RPM, runs.speed[-1] * RPM
         objective = d.chaotic_width(*ends, price=prices["cost"])
         compared = {"chaotic speeds": d.chaotic_width(*ends)}
-    names = subject.usual((d.BALANCE, *d.LAND_LOADS), d.COMPARED)
+    names = subject.usual((d.BALANCE, *jc.analysis.LAND_LOADS), d.COMPARED)
     compared |= {name: d.statistic(model, name) for name in names} | {d.OBJECTIVE: objective}
     length = {"batches": steps or subject.usual(10, 12), "batch": subject.usual(12, 16)}
     values, finer = objective.values(runs), objective.values(runs.fresh(1, initial_states=4))

@@ -238,8 +238,8 @@ def _measured(subject: Subject, found: Any) -> Any:
     """The data set with the size of the orbit and the loads of the land, where the model does not report means."""
     if subject.with_rollers:
         return found
-    loads, dims = jc.design.land_loads(subject.model, found), ("speed", "initial_state")
-    about = {"orbit_size": (jc.design.motions(subject.model, found)[0], "m")}
+    loads, dims = jc.analysis.land_loads(subject.model, found), ("speed", "initial_state")
+    about = {"orbit_size": (jc.analysis.motions(subject.model, found)[0], "m")}
     about |= {"peak_land_force": (loads["peak land force"], "N"), "wear_load": (loads["wear load"], "N m/s")}
     return found.assign({name: (dims[: x.ndim], x, {"units": unit}) for name, (x, unit) in about.items()})
 

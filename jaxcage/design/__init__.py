@@ -8,7 +8,6 @@
 | `optimiser`     | the cheapest design that keeps its requirements over an operating range            |
 | `check`         | simulations of a design from many initial states                                   |
 | `statistics`    | chaotic speeds, quantities and loads of designs from one sweep; comparisons        |
-| `loads`         | loads of the guiding land, size and whirl of the motion                            |
 | `slopes`        | derivatives of statistics by paired designs; tolerance budgets                     |
 | `survival_edges`| edges of lasting chaos with slopes by survival regression; widths of zones         |
 | `variance`      | Sobol indices                                                                      |
@@ -20,12 +19,10 @@
 from .._arguments import check_layer
 from .check import Checked as Checked, check_design as check_design
 from .design_space import DesignSpace as DesignSpace, Value as Value
-from .loads import LAND_LOADS as LAND_LOADS, land_loads as land_loads, motions as motions
-from .operating import OperatingRange as OperatingRange, UnstableWidth as UnstableWidth
-from .optimiser import SEARCHES as SEARCHES, Design as Design, Trial as Trial, design_for as design_for
+from .operating import OperatingRange as OperatingRange
+from .optimiser import SEARCHES as SEARCHES, Design as Design, design_for as design_for
 from .requirements import (
     COSTS as COSTS,
-    Budget as Budget,
     Price as Price,
     Requirement as Requirement,
     Requirements as Requirements,
@@ -36,7 +33,6 @@ from .slopes import (
     DIRECTIONS as DIRECTIONS,
     MeanGradient as MeanGradient,
     Slopes as Slopes,
-    StatisticGradient as StatisticGradient,
     ToleranceBudget as ToleranceBudget,
     gradient_of_pairs as gradient_of_pairs,
     mean_gradient as mean_gradient,
@@ -51,7 +47,6 @@ from .statistics import (
     STATISTICS as STATISTICS,
     BeforeAfter as BeforeAfter,
     Runs as Runs,
-    Statistic as Statistic,
     bearing_objective as bearing_objective,
     before_and_after as before_and_after,
     chaotic_width as chaotic_width,
@@ -70,9 +65,11 @@ from .survival_edges import (
 from .unknowns import (
     REVOLUTIONS as REVOLUTIONS,
     Ensemble as Ensemble,
+    Index as Index,
     Narrowed as Narrowed,
     binomial_interval as binomial_interval,
     ensemble as ensemble,
+    indices as indices,
     misses as misses,
     narrow as narrow,
     verdict_of as verdict_of,
@@ -80,10 +77,8 @@ from .unknowns import (
 from .variance import SobolIndices as SobolIndices, global_sensitivity as global_sensitivity
 from .verdict import (
     RANGE_SPEEDS as RANGE_SPEEDS,
-    Index as Index,
     Margins as Margins,
     RangeChance as RangeChance,
-    indices as indices,
     margins as margins,
     range_chance as range_chance,
 )

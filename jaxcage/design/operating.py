@@ -18,6 +18,7 @@ from scipy.optimize import minimize_scalar
 
 from .._errors import InputError
 from .._pytrees import compiled
+from ..analysis import land_reading
 from ..orbits import (
     Followed,
     Orbit,
@@ -34,7 +35,6 @@ from ..orbits import (
 )
 from ..solve import REVOLUTION, AbstractMethod, FixedSteps, strobe_map
 from .design_space import DesignSpace, Value
-from .loads import land_reading
 from .requirements import Requirement, balance_grade
 
 
@@ -307,7 +307,9 @@ class OperatingRange(_AroundEdges):
             if any(sizes[k] >= 1 for k in _maxima(sizes)):
                 return found
             if np.all(sizes <= 1) and self._stable_ends(place, found):
-                self._keep(near, place, found)
+                through = self.through(place)
+                state = near.state if through is None else through.state(near.speed) / self._scale(place, near.speed)
+                self._keep(near._replace(state=state), place, found)
                 return found
         return self._searched_again(place, near, moved)
 
@@ -335,6 +337,12 @@ class OperatingRange(_AroundEdges):
                 there = "open" if now is None else f"{now.value_rpm:.0f} rpm, {now.kind}"
                 self.handed_over.append(f"{name} edge: {why}; now {there}")
         return {name: solved.get(name) for name in anchor.edges}
+
+    def begin(self, place: Float[np.ndarray, " n"]) -> None:
+        """Accept the edges that a search finds at a place, even if they jumped on the way to it."""
+        told = len(self.handed_over)
+        self._searched_again(place, self._nearest(place), {})
+        del self.handed_over[told:]
 
     def values(self, place: Float[np.ndarray, " n"], wanted: Sequence[Requirement]) -> dict[str, Value] | str:
         """Values of all requirements at a place of the design space; or why there are none."""

@@ -147,6 +147,20 @@ class Problem:
             self.trials[key] = self.compute(place)
         return self.trials[key]
 
+    def begin(self, place: np.ndarray, across: bool = False) -> Trial:
+        """Trial at the first place of a search: edges that jumped on the way to it are accepted, and so are, `across`
+        an unstable range that has appeared, those that now bound the stable range."""
+        trial, key = self.at(place), place.tobytes()
+        if isinstance(self.range, OperatingRange) and (trial.lost or (across and self.born(trial) < 0)):
+            self.range.begin(place)
+            del self.trials[key], self.solved[key]
+            trial = self.at(place)
+        return trial
+
+    def born(self, trial: Trial) -> float:
+        """Slack of the requirement that no unstable range appears within the operating range."""
+        return min((float(s) for r, s in zip(self.wanted, trial.slack, strict=True) if r.of == "peak"), default=np.inf)
+
     def compute(self, place: np.ndarray) -> Trial:
         values = self._values(place)
         worst = values if isinstance(values, str) else self.worst(place, values, self.tolerance)
@@ -196,12 +210,6 @@ class Problem:
                 return made
             found[r.name] = made[r.of]
         return found
-
-    def whole(self, x: np.ndarray, like: np.ndarray) -> np.ndarray:
-        """Place with these values of the varied parameters and the others of `like`."""
-        place = like.copy()
-        place[self.free] = x
-        return place
 
 
 def design_for(
@@ -260,7 +268,7 @@ def design_for(
         range_ = OperatingRange(space, operating, keep.margin)
         problem = Problem(range_, listed(keep, model), cost_function(cost, model), free, tolerance)
     own = np.where(free, np.clip(space.place, 0, 1), space.place)
-    places = [own, *(problem.whole(x, own) for x in sobol(int(free.sum()), max(searches, 2), seed)[: searches - 1])]
+    places = [own, *np.where(free, sobol(own.size, max(searches, 2), seed), own)[: searches - 1]]
     told = lambda i: lambda done: say(f"search {i}", done, ITERATIONS)
     found = [SEARCHES[search](problem, begin, told(i)) for i, begin in enumerate(places, start=1)]
     best = min(found, key=lambda place: _merit(problem, place))
@@ -278,25 +286,47 @@ def _merit(problem: Problem, place: np.ndarray) -> tuple[float, float]:
 
 
 def _programme(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
-    """Find the best place by sequential programming in a trust region.
+    """Find the best place by sequential programming.
+
+    Where an unstable range appears the edges jump, and no gradient leads across. A search that such a range stops is
+    repeated from beyond it, one long step ahead along the other requirements.
+    """
+    end, stopped = _descent(problem, begin, say)
+    trial = problem.at(end)
+    if trial.lost or problem.cost is None or not (stopped or problem.born(trial) < ACTIVE):
+        return end
+    told, born = len(problem.range.handed_over), np.array([r.of == "peak" for r in problem.wanted])
+    open_, size = trial._replace(slack=np.where(born, LOST, trial.slack)), max(abs(trial.cost), 1e-12)
+    beyond = end + _step(problem, open_, [], LARGEST_RADIUS, size)[0]
+    if not problem.begin(beyond, across=True).lost:
+        beyond, _ = _descent(problem, beyond, say)
+        if _merit(problem, beyond) < _merit(problem, end):
+            problem.range.handed_over.append("an unstable range appeared, and the search went on beyond it")
+            return beyond
+    del problem.range.handed_over[told:]
+    return end
+
+
+def _descent(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) -> tuple[np.ndarray, bool]:
+    """Find a local optimum by sequential programming in a trust region; True if steps towards it lost an edge.
 
     Each subproblem has the cost itself, where it is cheap, and the requirements linearised with their exact gradients;
     SciPy's SLSQP solves it. A step costs one solution of the edges. A step that loses an edge is halved, and so is one
     that gains less than a tenth of the prediction, once its linearised requirements have been added. The penalty on the
     largest violation outweighs the cost, so that the search ends at a feasible place or at the least violation.
     """
-    trial, radius, largest = problem.at(begin), FIRST_RADIUS, LARGEST_RADIUS
-    size, refused = max(abs(trial.cost), 1e-12), list[Trial]()
+    trial, radius, largest = problem.begin(begin), FIRST_RADIUS, LARGEST_RADIUS
+    size, refused, stopped = max(abs(trial.cost), 1e-12), list[Trial](), False
     for turn in range(ITERATIONS):
         step, foreseen = _step(problem, trial, refused, radius, size)
         gain = problem.priced(trial, size) - foreseen
         if gain < ACCURACY or radius < LEAST_RADIUS:
             break
-        new = problem.at(problem.whole(trial.place[problem.free] + step, begin))
+        new = problem.at(trial.place + step)
         kept = (problem.priced(trial, size) - problem.priced(new, size)) / gain
         reach = min(radius, float(np.max(np.abs(step))))
         if new.lost:
-            radius, largest = reach / 2, reach / 4  # a longer step would lose the edge again
+            stopped, radius, largest = True, reach / 2, reach / 4  # a longer step would lose the edge again
         elif kept < 0.25:
             radius = reach if kept <= 0.1 and not refused else reach / 2  # the first retry only adds a linearisation
         elif kept > 0.75:
@@ -306,7 +336,7 @@ def _programme(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) 
         elif not new.lost:
             refused.append(new)
         say(turn + 1)
-    return trial.place
+    return trial.place, stopped
 
 
 def _step(
@@ -317,23 +347,22 @@ def _step(
     Requirements linearised at refused trials must hold too, such as those of another corner of the tolerances, but at
     the trial itself only up to its own slack, since a requirement may curve the other way.
     """
-    x = trial.place[problem.free]
+    x, reach = trial.place, np.where(problem.free, radius, 0.0)
     below = [np.maximum(t.slack + t.slack_slope @ (trial.place - t.place), trial.slack) for t in refused]
     slack = np.concatenate([trial.slack, *below])
-    slope = np.concatenate([trial.slack_slope, *(t.slack_slope for t in refused)])[:, problem.free]
-    last = np.append(np.zeros(x.size), PENALTY)
-    bounds = [(max(-radius, -v), min(radius, 1 - v)) for v in x]
+    slope = np.concatenate([trial.slack_slope, *(t.slack_slope for t in refused)])
+    low, high = np.maximum(-reach, -x), np.minimum(reach, 1 - x)
 
     def cost(z: np.ndarray) -> tuple[float, np.ndarray]:
-        value, by = problem.foreseen(trial, problem.whole(x + z[:-1], trial.place))
-        return value / size + PENALTY * z[-1], np.append(by[problem.free] / size, 0.0) + last
+        value, by = problem.foreseen(trial, x + z[:-1])
+        return value / size + PENALTY * z[-1], np.append(by / size, PENALTY)
 
     found = minimize(
         cost,
         np.append(np.zeros(x.size), max(0.0, -float(np.min(slack, initial=np.inf)))),
         jac=True,
         method="SLSQP",
-        bounds=[*bounds, (0, None)],
+        bounds=[*zip(low, high, strict=True), (0, None)],
         constraints={
             "type": "ineq",
             "fun": lambda z: slack + slope @ z[:-1] + z[-1],
@@ -341,31 +370,26 @@ def _step(
         },
         options={"ftol": 1e-9, "maxiter": 100},
     )
-    step = np.clip(found.x[:-1], *np.array(bounds).T)
+    step = np.clip(found.x[:-1], low, high)
     short = max(0.0, -float(np.min(slack + slope @ step, initial=np.inf)))
-    return step, problem.foreseen(trial, problem.whole(x + step, trial.place))[0] / size + PENALTY * short
+    return step, problem.foreseen(trial, x + step)[0] / size + PENALTY * short
 
 
 def _augmented(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
     """Find the best place by optax's Adam on an augmented Lagrangian, whose multipliers are updated eight times."""
-    place, weight, rounds, steps = begin, 10.0, 8, 12
+    place, weight, rounds = begin, 10.0, 8
     multiplier, size = np.zeros(len(problem.wanted)), max(abs(problem.at(begin).cost), 1e-12)
     for turn in range(rounds):
         adam = optax.adam(0.03 / (1 + turn))
-        state = adam.init(jnp.asarray(place[problem.free]))
-        for _ in range(steps):
+        state = adam.init(jnp.asarray(place))
+        for _ in range(12):
             trial = problem.at(place)
             broken = np.maximum(0.0, multiplier - weight * trial.slack)
-            slope = (trial.cost_slope / size - broken @ trial.slack_slope)[problem.free]
+            slope = np.where(problem.free, trial.cost_slope / size - broken @ trial.slack_slope, 0.0)
             with jax.numpy_dtype_promotion("standard"):  # Adam's bias correction is a power of an integer
                 move, state = adam.update(jnp.asarray(slope), state)
-            step, free = np.asarray(move), place[problem.free]
-            for _ in range(6):  # a step that loses an edge is halved
-                there = problem.whole(np.clip(free + step, 0, 1), begin)
-                if not problem.at(there).lost:
-                    place = there
-                    break
-                step = step / 2
+            steps = (np.clip(place + np.asarray(move) / 2**k, 0, 1) for k in range(6))  # halved if an edge is lost
+            place = next((there for there in steps if not problem.at(there).lost), place)
         multiplier = np.maximum(0.0, multiplier - weight * problem.at(place).slack)
         say((turn + 1) * ITERATIONS // rounds)
     known = [t.place for t in problem.trials.values() if not t.lost]

@@ -62,11 +62,6 @@ class Slopes:
         return math.sqrt(self.covariance[0, 0])
 
     @property
-    def by_relative_change_error(self) -> Float[np.ndarray, " n"]:
-        """Standard errors of the derivatives."""
-        return np.sqrt(np.diag(self.covariance)[1:])
-
-    @property
     def elasticity(self) -> Float[np.ndarray, " n"]:
         """Relative change of the value by that of each parameter; NaN if the value is 0."""
         return self.by_relative_change / (self.value or math.nan)

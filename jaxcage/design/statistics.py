@@ -18,12 +18,11 @@ from scipy.special import expit
 
 from .._errors import ArgumentError
 from .._pytrees import compiled
-from ..analysis import CHAOS_THRESHOLD, failed
+from ..analysis import CHAOS_THRESHOLD, LAND_LOADS, failed, land_loads
 from ..lanes import Plan, Progress, Run, Speeds, run_lanes
 from ..models import AbstractForcedSystem, CageModel, drawn_places, rolling_start
 from ..solve import AbstractMethod
 from .design_space import Models
-from .loads import LAND_LOADS, land_loads
 from .requirements import cost_function
 
 

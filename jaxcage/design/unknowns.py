@@ -17,17 +17,16 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Shaped
 
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
-from ..analysis import failed, restless
+from ..analysis import failed, motions, restless
 from ..files import Measurement, Range, Unknown, check_together
 from ..lanes import Progress, sobol
 from ..models import CageModel
 from ..solve import AbstractMethod, native
-from .loads import motions
 from .statistics import Runs
 
 
@@ -46,6 +45,8 @@ BINS = 4
 """Number of parts of a range whose chances are compared, to estimate how much an unknown explains."""
 KEPT = 0.25
 """Share of the draws of a stage around which the ranges close; if as many are accepted, the stage is the last."""
+RESAMPLED = 400
+"""Number of bootstrap samples for the error of an index."""
 FAR = 5.0
 """Saturation of a miss [tolerances], and the miss of a cage that wrongly rattles or is calm. Saturation is gradual, so
 that a tight tolerance still distinguishes near from far draws."""
@@ -78,6 +79,22 @@ def _require_some(unknowns: Sequence[Unknown]) -> None:
 # --- chances --------------------------------------------------------------------------------------------------------
 
 Verdict = Literal["calm", "chaotic", "calm as computed", "chaotic as computed", "not decided", "too few draws"]
+
+
+class Index(NamedTuple):
+    """First-order index of an unknown value: the share of the variance of an outcome that it explains alone, with its
+    standard error; how to measure it; mean outcome in the lowest and highest quarter of its range."""
+
+    label: str
+    share: float
+    error: float
+    source: str
+    quarters: tuple[float, float]
+
+    @property
+    def telling(self) -> bool:
+        """True if the index differs from zero by more than twice its error."""
+        return self.share > 2 * self.error > 0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -159,13 +176,27 @@ def binomial_interval(
     return low, high
 
 
-def explained(place: np.ndarray, y: np.ndarray) -> float:
+def indices(found: Ensemble, outcome: Shaped[np.ndarray, " draws"], known: Bool[np.ndarray, " draws"]) -> list[Index]:
+    """First-order indices of all unknown values for an outcome of each draw, such as chaos in a range, over the known
+    draws, largest first; empty if all of these agree."""
+    y, rows = np.asarray(outcome, dtype=float)[known], []
+    if not np.any(y != y[:1]):
+        return []
+    picks = np.random.default_rng(0).integers(len(y), size=(RESAMPLED, len(y)))
+    for unknown, place, source in zip(found.unknowns, found.place[known].T, found.sources, strict=True):
+        error = float(np.std([_explained(place[p], y[p]) for p in picks]))
+        quarters = float(y[place < 0.25].mean()), float(y[place > 0.75].mean())
+        rows.append(Index(unknown.label, _explained(place, y), error, source, quarters))
+    return sorted(rows, key=lambda row: -row.share)
+
+
+def _explained(place: np.ndarray, y: np.ndarray) -> float:
     """Share of the variance of y between quarters of `place`, less what chance alone would give."""
     parts = np.array_split(y[np.argsort(place)], BINS)
     between = sum(part.size * (part.mean() - y.mean()) ** 2 for part in parts)
     within = sum(((part - part.mean()) ** 2).sum() for part in parts)
     noise = (BINS - 1) * within / max(y.size - BINS, 1)
-    return float(max(between - noise, 0.0) / (between + within)) if between + within else 0.0
+    return float(max(between - noise, 0.0) / (between + within or 1.0))
 
 
 def ensemble(

@@ -16,7 +16,7 @@ from .._errors import InputError
 from .._parameters import EXTRA, parameter_info, parameters
 from .design_space import DesignSpace, Value
 from .operating import OperatingRange
-from .unknowns import Ensemble, binomial_interval, explained, verdict_of
+from .unknowns import Ensemble, binomial_interval, verdict_of
 
 
 RANGE_SPEEDS = 32
@@ -27,8 +27,6 @@ KELVINS = 10.0
 """Change of a temperature for which effects are given [K]."""
 SMALL = 0.02
 """Effects below this fraction of the largest one are not listed."""
-RESAMPLED = 400
-"""Number of bootstrap samples for the error of an index."""
 TURNED = "drawing", "operating"
 """Kinds of parameters that a designer or a user of the bearing can change."""
 ENDS = "lower", "upper"
@@ -74,37 +72,6 @@ def range_chance(found: Ensemble, low_rpm: float, high_rpm: float) -> tuple[Rang
     chaotic = np.any(found.chaotic[:, which] & ~found.failed[:, which], axis=1)
     known = chaotic | ~np.any(found.failed[:, which], axis=1)
     return RangeChance(int(chaotic.sum()), int(known.sum()), len(chaotic)), chaotic, known
-
-
-class Index(NamedTuple):
-    """First-order index of an unknown value: the share of the variance of the verdict that it explains alone, with its
-    standard error; how to measure it; chance of rattling in the lowest and highest quarter of its range."""
-
-    label: str
-    share: float
-    error: float
-    source: str
-    quarters: tuple[float, float]
-
-    @property
-    def telling(self) -> bool:
-        """True if the index differs from zero by more than twice its error."""
-        return self.share > 2 * self.error > 0
-
-
-def indices(found: Ensemble, chaotic: Draws, known: Draws) -> list[Index]:
-    """First-order indices of all unknown values for chaos in the range, over the known draws, largest first; empty if
-    all of these agree."""
-    y, places = chaotic[known].astype(float), found.place[known]
-    if not np.any(y != y[:1]):
-        return []
-    count = len(y)
-    picks, rows = np.random.default_rng(0).integers(count, size=(RESAMPLED, count)), []
-    for unknown, place, source in zip(found.unknowns, places.T, found.sources, strict=True):
-        again = [explained(place[p], y[p]) for p in picks]
-        quarters = float(y[place < 0.25].mean()), float(y[place > 0.75].mean())
-        rows.append(Index(unknown.label, explained(place, y), float(np.std(again)), source, quarters))
-    return sorted(rows, key=lambda row: -row.share)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,9 +13,9 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Array, Bool, Complex, Float
 
-from ..analysis import OrderSpectrum, dominant_orders
 from ..models import CageModel
 from ..solve import REVOLUTION, AbstractMethod, Lanes, histories, native
+from .spectra import OrderSpectrum, dominant_orders
 
 
 FILM = "least film"
@@ -28,8 +28,6 @@ peak is up to 5 % too low (case 1b at 9000 and 27500 rpm against 4096 samples), 
 MOTION_SAMPLES, MOTION_REVOLUTIONS = 32, 32
 """Samples per revolution, and revolutions, for the motion. The size of a circle at cage frequency is up to 0.5 % too
 small, at the fourth order up to 8 %; orders are resolved to 1/32, and interpolated between."""
-
-
 Designs = CageModel | Sequence[CageModel]
 
 
