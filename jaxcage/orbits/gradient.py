@@ -19,14 +19,12 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from .._arguments import require_x64
-from .._errors import ArgumentError
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
 from .._pytrees import compiled
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import AbstractMethod
 from .bifurcation import PointEquations, Solved, solve_point
-from .branch import FEIGENBAUM, Cascade
 from .continuation import in_parallel
 from .newton import as_root
 from .orbit import Orbit, OrbitEquations, sorted_multipliers
@@ -159,19 +157,6 @@ def sensitivities(
     require_x64()
     found = in_parallel(lambda name: sensitivity(system, points[name], name, method), list(points))
     return dict(zip(points, found, strict=True))
-
-
-def limit_sensitivity(
-    system: AbstractForcedSystem, cascade: Cascade, name: str = "limit", method: AbstractMethod | None = None
-) -> Sensitivity:
-    """Return the sensitivity of the speed at which a cascade accumulates, extrapolated in the same way as the speed.
-
-    **Raises:** `ValueError` for a cascade over a parameter other than speed, or of fewer than two points.
-    """
-    if len(cascade.points) < 2 or any(p.parameter != SPEED for p in cascade.points):
-        raise ArgumentError("cascade", said=f"must have two points over speed, but has {len(cascade.points)}.")
-    before, last = (sensitivity(system, p, name, method) for p in cascade.points[-2:])
-    return _combined(name, "period-doubling", ((1 + 1 / (FEIGENBAUM - 1), last), (-1 / (FEIGENBAUM - 1), before)))
 
 
 def width(onset: Sensitivity, exit_: Sensitivity, name: str = "width") -> Sensitivity:

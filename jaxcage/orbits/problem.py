@@ -25,7 +25,7 @@ from jaxtyping import Array, Float, Int
 from .._parameters import Parameter as Parameter, pick as pick
 from .._pytrees import Scalar
 from ..models import AbstractForcedSystem
-from ..solve import AbstractMethod, FixedSteps, StrobeMap, method as make_method, strobe_map
+from ..solve import REVOLUTION, AbstractMethod, FixedSteps, StrobeMap, method as make_method, strobe_map
 
 
 SPEED = "speed"
@@ -93,6 +93,8 @@ class OrbitProblem(eqx.Module):
     """Units of the free parameters."""
     periods: Int[Array, ""]
     """Revolutions after which the orbit closes."""
+    angles: tuple[int, ...] = eqx.field(static=True)
+    """Indices of the coordinates that are angles."""
 
     @property
     def dimension(self) -> int:
@@ -105,6 +107,14 @@ class OrbitProblem(eqx.Module):
     def state(self, u: Float[Array, " n"]) -> Float[Array, " dim"]:
         """Return the state at phase 0 [SI]."""
         return u[: self.dimension] * self.scale
+
+    def moved(self, u: Float[Array, " n"], image: Float[Array, " dim"]) -> Float[Array, " dim"]:
+        """Return the motion from the unknowns u to the image of the map, without whole revolutions of the angles."""
+        way = image - u[: self.dimension]
+        for i in self.angles:
+            turn = REVOLUTION / self.scale[i]
+            way = way.at[i].add(-turn * jnp.round(way[i] / turn))
+        return way
 
     def at(self, u: Float[Array, " n"], given: Given) -> Given:
         """Return system and speed at the unknowns u."""
@@ -152,7 +162,7 @@ def make_problem(
     """Return the problem in units of the system's scale at the given speed."""
     scale = jnp.stack([jnp.asarray(c, dtype=float) for c in given.system.scale(given.speed)])
     numbers = frozen((scale, jnp.asarray(units, dtype=float), jnp.asarray(periods, dtype=int)))
-    return OrbitProblem(method, parameters, *numbers)
+    return OrbitProblem(method, parameters, *numbers, given.system.angles)
 
 
 # --- steps per revolution -------------------------------------------------------------------------------------------
