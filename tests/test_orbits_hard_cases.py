@@ -235,8 +235,6 @@ def test_crossing_and_its_rate(kind):
     np.testing.assert_allclose(point.transversality, period, rtol=1e-6)
     turned = np.pi if kind == "period-doubling" else abs(np.angle(-np.exp(0.3j * period)))
     assert abs(point.angle - turned) < 1e-8
-    if kind == "period-doubling":
-        np.testing.assert_allclose(abs(point.direction), [1.0, 0.0], atol=1e-6)
 
 
 @pytest.mark.wide

@@ -234,8 +234,6 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     outcome = jnp.where(found.converged, jnp.where(matches, kept, Outcome.OTHER_KIND), Outcome.NO_SUCH_POINT)
     there = (outcome == Outcome.FOUND) | (outcome == Outcome.TANGENTIAL)
     keep = lambda x: jnp.where(there, x, jnp.nan)
-    direction = jnp.zeros(problem.dimension) if critical is None else known.right
-    length = jnp.linalg.norm(direction)
     return Point(
         **_place(equations, u, given, there),
         error=error,
@@ -243,7 +241,6 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
         multipliers=jnp.where(found.converged, multipliers, jnp.nan),
         residual=jnp.max(jnp.abs(found.newton.residual)),
         transversality=keep(rate / unit),
-        direction=keep(direction / jnp.where(length > 0, length, 1.0) * problem.scale),
         outcome=outcome,
         periods=problem.periods,
         kind="",

@@ -24,7 +24,7 @@ from .continuation import (
 )
 from .location import Place, bifurcations_of
 from .orbit import NearOrbit, Orbit
-from .point import CRITICAL, DOUBLE, UNEXPLAINED, Outcome, Point, read_start
+from .point import UNEXPLAINED, Outcome, Point, read_start
 from .problem import SETTLED, SPEED, Given, Parameter, name_of
 
 
@@ -146,7 +146,8 @@ def follow_both_ways(
     walk.finished()
     kept = [i for i in range(count) if not taken[i]]
     rows = [_joined(problem, walk.curves[i], walk.curves[i + count]) for i in kept]
-    found = dict(zip(kept, described(problem, rows), strict=True))
+    located = bifurcations_of(problem, [points for points, _ in rows])
+    found = {i: _branch(problem, *one, ended) for i, one, (_, ended) in zip(kept, located, rows, strict=True)}
     return [found.get(i) for i in range(count)]
 
 
@@ -162,12 +163,6 @@ def _joined(problem: ContinuationProblem, up: Path, down: Path) -> tuple[Points,
     count = stable.size - 1  # the last point is past the first
     order = (np.arange(count + 1) + int(np.argmin(stable[:-1]))) % count
     return row.take(order), ("closed", "closed")
-
-
-def described(problem: ContinuationProblem, rows: Sequence[tuple[Points, tuple[str, str]]]) -> list[Branch]:
-    """Return branches from their points and ends, after locating the bifurcations of all at the same time."""
-    found = bifurcations_of(problem, [points for points, _ in rows])
-    return [_branch(problem, *row, ended) for row, (_, ended) in zip(found, rows, strict=True)]
 
 
 def _branch(problem: ContinuationProblem, points: Points, places: Sequence[Place], ended: tuple[str, str]) -> Branch:
@@ -187,9 +182,6 @@ def _branch(problem: ContinuationProblem, points: Points, places: Sequence[Place
 def _point(problem: ContinuationProblem, place: Place, edge: bool) -> Point:
     kind, p, unit = place.kind, place.point, problem.units[0]
     assert p is not None
-    direction = np.zeros(problem.scale.size)
-    if kind in CRITICAL and kind not in DOUBLE:
-        direction = np.linalg.svd(problem.equations.monodromy(p) - CRITICAL[kind] * np.eye(direction.size))[2][-1]
     at, error = float(problem.values(p.u)[0]), place.error * unit
     lost = kind != UNEXPLAINED and error > SETTLED * max(abs(at), unit)
     value = float("nan") if lost else at
@@ -204,7 +196,6 @@ def _point(problem: ContinuationProblem, place: Place, edge: bool) -> Point:
         value,
         error,
         problem.multipliers(p),
-        direction * problem.scale,
         outcome=Outcome.UNEXPLAINED if kind == UNEXPLAINED else Outcome.NOT_CONVERGED if lost else Outcome.FOUND,
         index=place.after,
         edge=edge,

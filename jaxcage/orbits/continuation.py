@@ -67,11 +67,10 @@ class ContinuationProblem(eqx.Module):
         """Units of the state."""
         return np.asarray(self.equations.problem.scale)
 
-    def around(self, at: Any, periods: Any = None) -> "ContinuationProblem":
-        """Return the problem of orbits in the system's scale at a value of the parameter, with `periods` if given."""
+    def around(self, at: float) -> "ContinuationProblem":
+        """Return the problem of orbits in the system's scale at a value of the parameter."""
         mine, there = self.equations.problem, self.given.changed(self.parameter, jnp.asarray(at, dtype=float))
-        periods = mine.periods if periods is None else periods
-        problem = make_problem(there, mine.parameters, mine.units, periods, mine.method)
+        problem = make_problem(there, mine.parameters, mine.units, mine.periods, mine.method)
         return dataclasses.replace(self, equations=OrbitEquations(problem))
 
     def by_rodas4(self) -> "ContinuationProblem":

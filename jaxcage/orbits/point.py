@@ -146,8 +146,7 @@ class Point(eqx.Module):
     - `error`: change of the value with half the steps or, if larger, twice the change with an odd number near three
         quarters of them [SI]; infinite if these do not find it, NaN if the method has no number of steps; for an
         unexplained change the distance within which it lies. Under `jit`, `vmap` and `grad` only half are tried.
-    - `direction`: critical direction in the state [SI], of length 1 in units of the scale; zero for a Neimark-Sacker
-        bifurcation. `residual`: largest component of the equations, in units of the scale.
+    - `residual`: largest component of the equations, in units of the scale.
     - `transversality`: d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is
         infinite, the drift p dP/d parameter of the map along the critical direction, with p q = 1. It is not computed
         on a branch.
@@ -163,7 +162,6 @@ class Point(eqx.Module):
     value: Scalar = float("nan")
     error: Scalar = float("nan")
     multipliers: Complex[Numbers, " multipliers"] = eqx.field(default_factory=lambda: np.zeros(0, dtype=complex))
-    direction: Float[Numbers, " coordinates"] = eqx.field(default_factory=lambda: np.zeros(0))
     residual: Scalar = float("nan")
     transversality: Scalar = float("nan")
     outcome: Int[Array, ""] | int = Outcome.GIVEN.value
