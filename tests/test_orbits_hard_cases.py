@@ -123,7 +123,8 @@ def test_orbits_that_turn_by_whole_revolutions():
     np.testing.assert_allclose(orbit.state, state, atol=1e-6)
     np.testing.assert_allclose(np.sort_complex(orbit.multipliers), np.sort_complex(multipliers), atol=1e-5)
     branch = jc.branch(system, orbit, "torque", lower=0.1, upper=0.6)
-    fold = max((p for p in branch.special if p.kind == "fold"), key=lambda p: p.value)
+    assert branch.ended == ("closed", "closed") and [p.kind for p in branch.special] == ["fold", "fold"]
+    fold = max(branch.special, key=lambda p: p.value)
     (*_, torque), _ = shot(1.5, 0.3, [*fold.state, fold.value])
     assert abs(fold.value - torque) < fold.error + 1e-8
     exact = jc.bifurcation(system, "fold", fold, "torque")

@@ -25,7 +25,7 @@ from .continuation import (
 from .location import Place, bifurcations_of
 from .orbit import NearOrbit, Orbit
 from .point import UNEXPLAINED, Outcome, Point, read_start
-from .problem import SETTLED, SPEED, Given, Parameter, name_of
+from .problem import SETTLED, SPEED, Given, Parameter, name_of, without_turns
 
 
 @dataclasses.dataclass(frozen=True)
@@ -161,8 +161,11 @@ def _joined(problem: ContinuationProblem, up: Path, down: Path) -> tuple[Points,
     row = (up if up.ended == "closed" else down).row
     stable = problem.unstable(row) == 0
     count = stable.size - 1  # the last point is past the first
-    order = (np.arange(count + 1) + int(np.argmin(stable[:-1]))) % count
-    return row.take(order), ("closed", "closed")
+    order = np.arange(count + 1) + int(np.argmin(stable[:-1]))
+    around = row.u[-1] - row.u[0]
+    turned = np.outer(order // count, around - without_turns(around, problem.turns))  # where angles turn on the way
+    row = row.take(order % count)
+    return row._replace(u=row.u + turned), ("closed", "closed")
 
 
 def _branch(problem: ContinuationProblem, points: Points, places: Sequence[Place], ended: tuple[str, str]) -> Branch:

@@ -247,8 +247,9 @@ def _is_there(problem: ContinuationProblem, p: Place) -> bool:
     if p.point is None:
         return False
     near = 1e-4 if p.kind == "Neimark-Sacker" else 1e-3  # a double multiplier is accurate to sqrt(rounding)
-    off = to_critical(critical_of(p.kind), jnp.asarray(problem.multipliers(p.point)))
-    return bool(off[DOUBLE.get(p.kind, 1) - 1] < near)
+    off = np.asarray(to_critical(critical_of(p.kind), jnp.asarray(problem.multipliers(p.point))))
+    count = DOUBLE.get(p.kind, 1)
+    return off.size >= count and bool(off[count - 1] < near)
 
 
 def _locate(problem: ContinuationProblem, places: Sequence[Place]) -> None:

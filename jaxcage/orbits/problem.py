@@ -19,6 +19,7 @@ import equinox as eqx
 import jax
 import jax.extend as jex
 import jax.numpy as jnp
+import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
@@ -36,9 +37,20 @@ GIVEN_UP = 2048  # if this many steps find nothing, more are not tried
 IMAGE, SLOPE = 1e-6, 1e-3
 """Largest change of the map, in units of the system's scale, and of its derivative, relative to one plus its size,
 between an orbit's steps and half as many."""
+ENDLESS = 1e100  # revolution of a component that is no angle
 POINT = 1e-7  # largest relative change of the value of a bifurcation
 SETTLED = 2e-4  # a point with a larger relative change, or an orbit with a larger error, counts as not found
 BY_OTHERS = 2.0  # the stated error of a point is at least this many times its change with `other_steps`
+
+
+def turns_of(angles: Sequence[int], dimension: int) -> Float[np.ndarray, " dim"]:
+    """Return 2 pi for each component of a state that is an angle, and a number beyond all others for the rest."""
+    return np.where(np.isin(np.arange(dimension), angles), REVOLUTION, ENDLESS)
+
+
+def without_turns(way: Any, turns: Any) -> Any:
+    """Return differences of states without whole revolutions of the angles; arrays of JAX or NumPy."""
+    return way - turns * (way / turns).round()
 
 
 def value_of(system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> Array:
@@ -108,13 +120,14 @@ class OrbitProblem(eqx.Module):
         """Return the state at phase 0 [SI]."""
         return u[: self.dimension] * self.scale
 
+    @property
+    def turns(self) -> Float[Array, " dim"]:
+        """Revolutions of the components that are angles (see `turns_of`), in units of the state."""
+        return turns_of(self.angles, self.dimension) / self.scale
+
     def moved(self, u: Float[Array, " n"], image: Float[Array, " dim"]) -> Float[Array, " dim"]:
         """Return the motion from the unknowns u to the image of the map, without whole revolutions of the angles."""
-        way = image - u[: self.dimension]
-        for i in self.angles:
-            turn = REVOLUTION / self.scale[i]
-            way = way.at[i].add(-turn * jnp.round(way[i] / turn))
-        return way
+        return without_turns(image - u[: self.dimension], self.turns)
 
     def at(self, u: Float[Array, " n"], given: Given) -> Given:
         """Return system and speed at the unknowns u."""

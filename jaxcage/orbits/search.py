@@ -19,12 +19,12 @@ from .._arguments import require_at_least
 from ..lanes import states_at, sweep
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
-from ..solve import REVOLUTION, AbstractMethod
+from ..solve import AbstractMethod
 from .arclength import StepControl
 from .branch import Branch, follow_both_ways
 from .continuation import ContinuationProblem, orbit_curves
 from .point import Point
-from .problem import SPEED, Given
+from .problem import SPEED, Given, turns_of, without_turns
 
 
 ROUND, ROUNDS = 4, 8  # branches followed at a time, and maximum number of rounds
@@ -41,17 +41,10 @@ Apart = Callable[[np.ndarray, np.ndarray, float], float]
 """Distance of two states at a speed [rad/s], in units of the system's scale."""
 
 
-def _without_turns(way: np.ndarray, angles: Sequence[int]) -> np.ndarray:
-    """Return states, or differences of states, without whole revolutions of the angles."""
-    way = np.array(way)
-    for i in angles:
-        way[..., i] -= REVOLUTION * np.round(way[..., i] / REVOLUTION)
-    return way
-
-
 def _distance_in(system: AbstractForcedSystem) -> Apart:
     scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
-    return lambda one, other, speed: float(np.max(np.abs(_without_turns(one - other, system.angles)) / scale(speed)))
+    turns = turns_of(system.angles, system.dimension)
+    return lambda one, other, speed: float(np.max(np.abs(without_turns(one - other, turns)) / scale(speed)))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -175,7 +168,7 @@ def _crossings(branch: Branch, speed: float) -> list[tuple[bool, np.ndarray, np.
 
 
 def _same(state: np.ndarray, other: np.ndarray, angles: Sequence[int], tolerance: float) -> bool:
-    return np.allclose(other + _without_turns(state - other, angles), other, tolerance)
+    return np.allclose(other + without_turns(state - other, turns_of(angles, state.size)), other, tolerance)
 
 
 def _distinct(points: Sequence[Point], angles: Sequence[int]) -> tuple[Point, ...]:
@@ -265,15 +258,15 @@ def _finished(settled: xr.Dataset) -> list[list[int]]:
 def _stable_orbits(problem: ContinuationProblem, settled: xr.Dataset, apart: Apart) -> list[_Settled]:
     """Return the stable orbits to which Newton's method converges from the ends of simulations, by speed."""
     lanes = _finished(settled)
-    angles = problem.given.system.angles
-    last, speeds = _without_turns(settled["last"].values, angles), settled["speed"].values
+    turns = turns_of(problem.given.system.angles, problem.scale.size)
+    last, speeds = without_turns(settled["last"].values, turns), settled["speed"].values
     met = [(last[i, j], float(speeds[i])) for i, j in lanes]
     if not met:
         return []
     problem = problem.around(met[0][1])
     strobe = settled["strobe"].values
     moved = strobe[..., -1, :] - strobe[..., -2, :] if strobe.shape[2] > 1 else np.zeros_like(last)
-    near = np.max(np.abs(_without_turns(moved, angles) / settled["scale"].values), axis=-1) < NEARLY
+    near = np.max(np.abs(without_turns(moved, turns) / settled["scale"].values), axis=-1) < NEARLY
     points = problem.orbits_near(met, np.array([near[i, j] for i, j in lanes]))
     good = points.converged.copy()
     good[good] = problem.unstable(points.take(good)) == 0
