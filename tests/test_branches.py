@@ -82,6 +82,7 @@ def side_by_side(count):
     return jc.branch(system, orbit, "g", lower=0.15, upper=0.28, method=FINE)
 
 
+@pytest.mark.wide
 def test_two_identical_oscillators_double_together():
     """At the force at which one alone doubles (DOP853)."""
     (point,) = side_by_side(2).special

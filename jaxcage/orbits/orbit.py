@@ -30,6 +30,7 @@ from .problem import (
     is_traced,
     make_problem,
     with_fallback,
+    without_turns,
 )
 
 
@@ -169,6 +170,7 @@ def _find(
     """Find the orbit, without derivatives; also return its equations and unknowns."""
     if revolutions is not None:
         guess = _simulated(problem, given, guess, revolutions, spinning)
+        guess = without_turns(guess, problem.turns * problem.scale)
     equations = OrbitEquations(problem)
     u, found = refined(equations, given, guess / problem.scale, counts)
     converged = found.converged & ~((counts.tolerance > 0) & (found.error > SETTLED))
