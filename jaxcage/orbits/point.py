@@ -221,7 +221,7 @@ class Point(eqx.Module):
             return f"{self.kind} near {float(self.speed_rpm):.3f} rpm, not solved for yet"
         if not bool(self.converged):
             return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e})"
-        angle = f", angle {np.degrees(self.angle):.2f} deg" if self.kind == "Neimark-Sacker" else ""
+        angle = f", angle {np.degrees(self.angle):.2f} deg" if self.kind.endswith("Neimark-Sacker") else ""
         error = f" ± {float(self.error_rpm):.1g}" if self.parameter == SPEED else ""
         return (
             f"{self.kind} at {float(self.speed_rpm):.3f}{error} rpm, {self.parameter} = {float(self.value):.9g} "
