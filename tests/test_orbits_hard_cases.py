@@ -129,8 +129,6 @@ def test_orbits_that_turn_by_whole_revolutions():
     assert abs(fold.value - torque) < fold.error + 1e-8
     exact = jc.bifurcation(system, "fold", fold, "torque")
     assert abs(exact.value - torque) < exact.error + 1e-8
-    still = jc.ForcedOscillator(Turning(jnp.asarray(0.3)), coordinates=1)
-    assert not jc.periodic_orbit(still, 1.5, guess=orbit).converged
 
 
 @pytest.mark.wide
@@ -139,7 +137,7 @@ def test_orbits_at_angles_that_differ_by_revolutions_are_one():
     system = jc.ForcedOscillator(Turning(jnp.asarray(0.0)), coordinates=1, angles=(0,), initial_states=states)
     found = jc.synchronous_orbits(system, 2.0, 2.2, count=3, discard=100)
     (only,) = found.stretches
-    assert only.met == 9 and len(found.branches) == 1 and len(found.coexisting(2.1)) == 1
+    assert only.met == 9 and found.missed == 0 and len(found.coexisting(2.1)) == 1
 
 
 def test_angles_must_be_coordinates_in_which_the_law_repeats():

@@ -7,6 +7,7 @@ planes across the chord between two orbits. All bifurcations are located at the 
 import dataclasses
 import itertools
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -168,7 +169,7 @@ def _signals(problem: ContinuationProblem, points: Points) -> dict[str, np.ndarr
     return tests
 
 
-def _signal(problem: ContinuationProblem, points: Points, kind: str) -> np.ndarray:
+def _signal(problem: ContinuationProblem, points: Points, kind: str) -> Any:
     """Return the function that changes sign at a bifurcation of one kind; for those that cross together, the sum of the
     logarithms of the multipliers nearest the unit circle."""
     if kind not in DOUBLE:
