@@ -2,7 +2,8 @@
 
 Each change draws a speed at which the design has a stable synchronous orbit, and new values of six parameters within 20
 per cent. The edges of the stable range around that speed are followed to the changed design, where `stable_range`
-searches without hints. An edge is
+searches without hints but the speeds at which orbits are stable by the followed edges, since a stable range may move by
+more than its width. An edge is
 
 - `followed`, if the search finds it, too: the same kind at the same speed to 1e-5;
 - `ended`, if following says why (`turned back`, `left the range`, `neutral saddle`), and no edge that the search finds
@@ -59,6 +60,15 @@ def edges_of(found: StableRange | None) -> dict[str, Point]:
     return {name: point for name, point in both.items() if point is not None}
 
 
+def beside(followed: dict[str, Followed], otherwise: tuple[float, float]) -> tuple[float, float]:
+    """Speeds [rad/s] at which orbits are stable by the followed edges, if there are any that bound a stable range."""
+    at = {end: jc.rpm(f.edge.value_rpm) for end, f in followed.items() if f.edge is not None and f.edge.bounds}
+    if not at:
+        return otherwise
+    low, high = at.get("lower", 0.99 * at.get("upper", 0.0)), at.get("upper", 1.01 * at.get("lower", 0.0))
+    return (float(low), float(high)) if low < high else otherwise
+
+
 def same(edge: Sensitivity, point: Point) -> bool:
     """Whether both are the same bifurcation."""
     return edge.kind == point.kind and abs(edge.value_rpm / float(point.speed_rpm) - 1) < SAME
@@ -111,11 +121,15 @@ def main() -> None:
             if before is None or not edges_of(before):
                 continue
             done += 1
-            fresh = edges_of(stable_range(other, before.ends, limits))
+            began = time.perf_counter()
+            followed = {
+                end: follow(model, point, other, lower=limits[0], upper=limits[1], name=end)
+                for end, point in edges_of(before).items()
+            }
+            spent += time.perf_counter() - began
+            fresh = edges_of(stable_range(other, beside(followed, before.ends), limits))
             for end, point in edges_of(before).items():
-                began = time.perf_counter()
-                found = follow(model, point, other, lower=limits[0], upper=limits[1], name=end)
-                spent += time.perf_counter() - began
+                found = followed[end]
                 said = verdict((model, other), point, limits, fresh, found)
                 count[said] += 1
                 if said == "followed" and found.edge is not None:

@@ -180,29 +180,6 @@ def test_width_between_two_edges(found):
     assert len(lines) == 1 + sum(e != 0.0 for e in wide.elasticity.values())
 
 
-def test_sensitivity_of_the_limit_of_a_cascade(monkeypatch):
-    """Doublings are planted at L - D/4.669^n, where L and D depend on the gap: the derivative of L comes from the last
-    two of them."""
-    per_rpm, ratio = 30 / np.pi, 4.669201609102990
-    limit, distance = np.array([9000.0, 250.0]), np.array([800.0, 40.0])  # [rpm], and by the gap
-    places = [limit - distance / ratio**n for n in range(4)]
-    points = tuple(Point("period-doubling", place[0] / per_rpm, np.zeros(4)) for place in places)
-    known = {float(p.value): place for p, place in zip(points, places, strict=True)}
-
-    def planted(system, point, name, method):
-        value, slope = known[float(point.value)]
-        one = dict(derivative={"gap": slope}, elasticity={"gap": slope / value}, homogeneity={"mass": 0.0})
-        return jc.orbits.Sensitivity(name, point.kind, value, **one, transversality=1.0, status="converged")
-
-    monkeypatch.setattr("jaxcage.orbits.gradient.sensitivity", planted)
-    cascade = jc.orbits.Cascade(points, limit[0] / per_rpm, 0.0)
-    found = jc.orbits.limit_sensitivity(CASE, cascade)
-    np.testing.assert_allclose([found.value_rpm, found.derivative["gap"]], limit, rtol=1e-12)
-    assert found.elasticity["gap"] == pytest.approx(limit[1] / limit[0], rel=1e-12)
-    with pytest.raises(ValueError, match="`cascade` must have two points over speed, but has 1"):
-        jc.orbits.limit_sensitivity(CASE, jc.orbits.Cascade(points[:1], limit[0], 0.0))
-
-
 def test_edge_that_is_not_there():
     """A fold is asked for where the pair leaves as a torus: no number is better than a wrong one."""
     rpm, state = STATES["Neimark-Sacker"]

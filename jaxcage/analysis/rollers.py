@@ -35,8 +35,6 @@ class Around:
     """Mean pocket force by which a roller drives the cage, counted as zero without contact [N]."""
     braking_force: Float[np.ndarray, " bins"]
     """Mean pocket force by which a roller brakes the cage, counted as zero without contact [N]."""
-    largest_force: Float[np.ndarray, " bins"]
-    """Largest pocket force at any sample [N]."""
 
 
 def around(history: RollerHistory) -> Around:
@@ -48,8 +46,6 @@ def around(history: RollerHistory) -> Around:
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = lambda x: np.bincount(where.ravel(), (weight * x).ravel(), bins) / total
         force = np.sign(history.angle[-1] - history.angle[0]) * history.pocket_force
-        largest = np.full(bins, -np.inf)
-        np.maximum.at(largest, where.ravel(), np.abs(force).ravel())
         return Around(
             angle=(np.arange(bins) + 0.5) * 2 * np.pi / bins,
             roller_slip=mean(history.roller_slip),
@@ -57,7 +53,6 @@ def around(history: RollerHistory) -> Around:
             inner_load=mean(history.inner_load),
             driving_force=mean(np.maximum(force, 0.0)),
             braking_force=mean(np.maximum(-force, 0.0)),
-            largest_force=np.where(np.isfinite(largest), largest, np.nan),
         )
 
 

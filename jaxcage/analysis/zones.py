@@ -41,8 +41,7 @@ class Edge:
     mechanism: str = "unknown"
     """Mechanism: `period-doubling`, `Neimark-Sacker`, `fold` or `unknown`."""
     basis: str = "statistical"
-    """Source: `statistical`, from a sweep; `located`, a bifurcation that was solved for; `cascade`, the extrapolated
-    limit of a period-doubling cascade."""
+    """Source: `statistical`, from a sweep; `located`, a bifurcation that was solved for."""
 
     def __str__(self) -> str:
         if self.basis == "statistical":

@@ -47,7 +47,7 @@ def explained(
 ) -> tuple[Answer, dict[str, Any]]:
     """Answer on a sweep with the mechanisms of its zones and unstable ranges; sensitivities of exact edges."""
     name, beside, loss = subject.name, subject.beside, jc.unstable_ranges(orbits)
-    known = jc.orbits.explain(jc.zones(found), orbits, subject.model, method)
+    known = jc.orbits.explain(jc.zones(found), orbits)
     slopes = {} if quick else jc.show.edge_slopes(subject.model, loss, known, method)
     tables = [
         *jc.show.motion_tables(name, known.zones, beside),

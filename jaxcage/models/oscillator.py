@@ -66,14 +66,19 @@ def components(what: str, law: Callable[..., State], *arguments: Any, number: in
     return tuple(jnp.asarray(part, dtype=float) if whole(part) else part for part in parts)
 
 
-def require_repeats(what: str, law: Callable[..., State], states: Sequence[tuple[State, ...]]) -> None:
-    """Compare the law at a few phases with itself one revolution later, in states as its arguments.
+def require_repeats(
+    what: str, law: Callable[..., State], states: Sequence[tuple[State, ...]], angles: Sequence[int] = ()
+) -> None:
+    """Compare the law at a few phases with itself one revolution later, and with all angles one revolution larger, in
+    states as its arguments.
 
     **Raises:** `ValueError` where it differs. A law that cannot be compared passes: one that raises an error, holds
     traced numbers or has no row of real numbers as its result. It is reported where the law is used.
     """
 
-    def row(turn: float) -> np.ndarray:
+    turned = [(tuple(c + 2 * np.pi * (i in angles) for i, c in enumerate(q)), *rest) for q, *rest in states]
+
+    def row(turn: float, states: Sequence[tuple[State, ...]] = states) -> np.ndarray:
         with np.errstate(all="ignore"):
             found = [
                 law(np.float64(tau + turn), *states[i % len(states)], np.float64(speed))
@@ -84,14 +89,18 @@ def require_repeats(what: str, law: Callable[..., State], states: Sequence[tuple
         return np.array(found, dtype=float)
 
     try:
-        now, later = row(0.0), row(2 * np.pi)
-        size = np.nan_to_num(np.maximum(np.abs(now), np.abs(later)), posinf=0.0)
-        with np.errstate(invalid="ignore"):
-            off = np.abs(later - now) > REPEATS * np.maximum(size, ROUNDING * size.max(axis=0))
-        differs = np.any(off) and np.array_equal(now, row(0.0), equal_nan=True)
+        now, off = row(0.0), []
+        for other in (row(2 * np.pi), row(0.0, turned)):
+            size = np.nan_to_num(np.maximum(np.abs(now), np.abs(other)), posinf=0.0)
+            with np.errstate(invalid="ignore"):
+                off.append(np.any(np.abs(other - now) > REPEATS * np.maximum(size, ROUNDING * size.max(axis=0))))
+        later, by_angle = off if np.array_equal(now, row(0.0), equal_nan=True) else (False, False)
     except Exception:
         return
-    if differs:
+    if by_angle:
+        said = f"must be coordinates in which the law repeats after 2 pi, but {shown(angles)} was given."
+        raise ArgumentError("angles", said=said)
+    if later:
         raise InputError(
             f"{what} must repeat after one revolution (tau -> tau + 2 pi), but does not: take the slowest forcing as "
             "the revolution, so that all others are whole multiples of it, and `jnp.mod(tau, 2 * jnp.pi)` in pulses."
@@ -116,8 +125,9 @@ class _UsersSystem(AbstractForcedSystem):
     _scale: tuple[float, ...] = eqx.field(static=True)
     _starts: tuple[tuple[float, ...], ...] = eqx.field(static=True)
     _harmonics: int = eqx.field(static=True)
+    _angles: tuple[int, ...] = eqx.field(static=True)
 
-    def _set(self, scale: Any, initial_states: Any, harmonics: int) -> None:
+    def _set(self, scale: Any, initial_states: Any, harmonics: int, angles: Sequence[int], coordinates: int) -> None:
         """Keep what the user gave. **Raises:** `ValueError` for what does not fit the system."""
         n = self.dimension
         magnitudes = _finite((scale,) * n if np.ndim(scale) == 0 else scale, n)
@@ -133,8 +143,12 @@ class _UsersSystem(AbstractForcedSystem):
         if not 1 <= harmonics <= MOST_HARMONICS:
             said = f"must be a whole number from 1 to {MOST_HARMONICS}, but {shown(harmonics)} was given."
             raise ArgumentError("harmonics", said=said)
+        if wrong := [i for i in angles if not 0 <= i < coordinates]:
+            said = f"must be numbers of coordinates, from 0 to {coordinates - 1}, but {wrong[0]} is among them."
+            raise ArgumentError("angles", said=said)
         default = [tuple(p[i % 4] * (1 + i // 4) * s for i, s in enumerate(magnitudes)) for p in PATTERNS]
         self._scale, self._starts, self._harmonics = magnitudes, tuple(rows or default), int(harmonics)
+        self._angles = tuple(map(int, angles))
 
     @property
     def _probes(self) -> list[State]:
@@ -144,6 +158,10 @@ class _UsersSystem(AbstractForcedSystem):
     @property
     def harmonics(self) -> int:
         return self._harmonics
+
+    @property
+    def angles(self) -> tuple[int, ...]:
+        return self._angles
 
     def scale(self, speed: Scalar) -> State:
         return tuple(jnp.asarray(s, dtype=float) for s in self._scale)
@@ -166,17 +184,19 @@ class ForcedSystem(_UsersSystem):
         scale: Scalar | Numbers = 1.0,
         initial_states: Sequence[Numbers] | np.ndarray | Array = (),
         harmonics: int = 1,
+        angles: Sequence[int] = (),
     ):
         """**Arguments:** `rates(tau, y, speed)`, a function or a module (whose arrays are then differentiable
         parameters), the same at tau and tau + 2 pi; number of state components; characteristic magnitude of the
-        components; initial states for sweeps; highest harmonic of the revolution in the law.
+        components; initial states for sweeps; highest harmonic of the revolution in the law; indices of the components
+        that are angles.
 
         **Raises:** `ValueError` for settings that do not fit, and for a law that does not repeat after one revolution.
         """
         require_at_least(1, dimension=dimension)
         self.rates, self._dimension = rates, dimension
-        self._set(scale, initial_states, harmonics)
-        require_repeats(_RATES, rates, [(y,) for y in self._probes])
+        self._set(scale, initial_states, harmonics, angles, dimension)
+        require_repeats(_RATES, rates, [(y,) for y in self._probes], self._angles)
 
     @property
     def dimension(self) -> int:
@@ -208,18 +228,21 @@ class ForcedOscillator(_UsersSystem):
         scale: Scalar | Numbers = 1.0,
         initial_states: Sequence[Numbers] | np.ndarray | Array = (),
         harmonics: int = 1,
+        angles: Sequence[int] = (),
     ):
         """**Arguments:** `acceleration(tau, q, v, speed)`, a function or a module (whose arrays are then differentiable
         parameters), the same at tau and tau + 2 pi, with velocities v = dq/dt; number of coordinates; characteristic
         magnitude of the state components (coordinates first); initial states (q, v) for sweeps; highest harmonic of
-        the revolution in the law.
+        the revolution in the law; indices of the coordinates that are angles: periodic orbits may turn by whole
+        revolutions in them, and states that differ by these are the same.
 
         **Raises:** `ValueError` for settings that do not fit, and for a law that does not repeat after one revolution.
         """
         require_at_least(1, coordinates=coordinates)
         self.acceleration, self.coordinates = acceleration, coordinates
-        self._set(scale, initial_states, harmonics)
-        require_repeats(_ACCELERATION, acceleration, [(y[:coordinates], y[coordinates:]) for y in self._probes])
+        self._set(scale, initial_states, harmonics, angles, coordinates)
+        probes = [(y[:coordinates], y[coordinates:]) for y in self._probes]
+        require_repeats(_ACCELERATION, acceleration, probes, self._angles)
 
     @property
     def dimension(self) -> int:

@@ -60,6 +60,11 @@ class AbstractForcedSystem(eqx.Module):
         """
         return 1
 
+    @property
+    def angles(self) -> tuple[int, ...]:
+        """Indices of the coordinates that are angles [rad]: a periodic orbit may turn by whole revolutions in them."""
+        return ()
+
     def abrupt(self, y: State, rate: State) -> tuple[Scalar, Scalar] | None:
         """Distance of a state from where the law changes abruptly, at least the width of the change, and the rate at
         which the state approaches it [1/rad] when it changes by `rate`; None for a law without abrupt changes.

@@ -9,7 +9,7 @@
 | `arclength`       | step control of continuation: predictions, accepted and rejected steps              |
 | `continuation`    | pseudo-arclength continuation, an iterator with corrector, step control and events  |
 | `location`        | bifurcations between orbits of a branch, compared with every change of stability    |
-| `branch`          | branches of orbits with their bifurcations; period-doubling cascades                |
+| `branch`          | branches of orbits with their bifurcations                                          |
 | `bifurcation`     | Newton's method for bifurcation points                                              |
 | `curves`          | curves of bifurcation points in two parameters; edges from one design to another    |
 | `search`          | search for synchronous orbits over a range of speed, without an initial guess       |
@@ -22,9 +22,7 @@ from .arclength import StepControl as StepControl
 from .bifurcation import bifurcation as bifurcation
 from .branch import (
     Branch as Branch,
-    Cascade as Cascade,
     branch as branch,
-    cascade as cascade,
 )
 from .curves import (
     Curve as Curve,
@@ -36,7 +34,6 @@ from .curves import (
 from .gradient import (
     OrbitSlopes as OrbitSlopes,
     Sensitivity as Sensitivity,
-    limit_sensitivity as limit_sensitivity,
     orbit_slopes as orbit_slopes,
     sensitivities as sensitivities,
     sensitivity as sensitivity,
@@ -64,6 +61,6 @@ from .unstable import (
 
 check_layer(
     globals(),
-    "bifurcation branch cascade curve "
+    "bifurcation branch curve "
     "explain follow unstable_ranges periodic_orbit sensitivities sensitivity stable_range synchronous_orbits",
 )

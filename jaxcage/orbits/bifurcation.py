@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._arguments import require_at_least, require_x64
-from .._errors import ArgumentError
 from .._pytrees import Scalar, compiled
 from ..models import AbstractForcedSystem
 from ..solve import AbstractMethod
@@ -17,7 +16,7 @@ from .branch import follow_both_ways
 from .continuation import Path, orbit_curves
 from .location import sign_changes
 from .newton import AbstractEquations, Found, as_root, refined
-from .orbit import SPUN, Orbit, PointGuess, periodic_orbit, sorted_multipliers
+from .orbit import NearOrbit, Orbit, sorted_multipliers
 from .point import (
     Kind,
     Outcome,
@@ -54,6 +53,7 @@ from .problem import (
 TANGENTIAL = 1e-2  # smallest change of |mu| for a relative change of the parameter by 1 at a crossing
 ON_CIRCLE = 1e-5  # largest squared distance of a critical multiplier: a double one is accurate to sqrt(rounding)
 WALK = StepControl(first=0.05, longest=0.25, most=250)  # along a branch that is searched for a bifurcation
+REACH = 0.1  # distance to which it is followed, as a fraction of the parameter's value (of 1 if that is 0)
 
 
 class Singular(NamedTuple):
@@ -77,7 +77,7 @@ class PointEquations(AbstractEquations):
 
     def closing(self, u: Array, image: Array, monodromy: Array) -> tuple[Array, Singular]:
         g, q, p = bordered(singular_matrix(self.critical, monodromy), self.left, self.right)
-        return jnp.append(image - u[: self.problem.dimension], g), Singular(monodromy, q, p)
+        return jnp.append(self.problem.moved(u, image), g), Singular(monodromy, q, p)
 
     def monodromy(self, found: Any) -> Any:
         return found.aux.monodromy
@@ -91,48 +91,38 @@ class PointEquations(AbstractEquations):
 def bifurcation(
     system: AbstractForcedSystem,
     kind: Kind,
-    guess: PointGuess,
+    guess: NearOrbit,
     parameter: Parameter = SPEED,
     *,
     speed: Scalar | None = None,
     periods: int | Int[Array, ""] | None = None,
-    reach: float | int = 0.1,
     method: AbstractMethod | None = None,
 ) -> Point:
     """Find the bifurcation of `kind` near `guess`, with `parameter` free.
 
-    If Newton's method fails, the branch of orbits through `guess` is followed both ways to the nearest bifurcation.
+    If Newton's method fails, the branch of orbits through `guess` is followed both ways to the nearest bifurcation (not
+    under `jit`, `vmap` and `grad`).
 
     **Arguments:**
 
     - `kind`: `period-doubling`, `Neimark-Sacker` or `fold`. Branch points, which only systems with a symmetry have, are
         found by `branch`.
-    - `guess`: a value of the parameter [SI], at which the orbit is found by simulation; an `Orbit` or a `Point`; or a
-        pair (state [SI], value of the parameter).
+    - `guess`: an `Orbit`, a `Point`, or a pair (state [SI], value of the parameter).
     - `parameter`: `"speed"`, the name of a parameter, or a function that picks it from the system.
     - `speed`: speed [rad/s], if it is not the parameter and `guess` does not contain it.
     - `periods`: revolutions after which the orbit closes; by default those of `guess`, else 1.
-    - `reach`: distance to which the branch is followed, as a fraction of the parameter's value (of 1 if that is 0);
-        0 turns this off. Under `jit`, `vmap` and `grad` the branch is not followed.
 
-    **Returns:** `Point`; if none is found there is no exception, and the point's `looked` describes the search. The
-    function works under `jit` and `vmap`; value, speed and state have derivatives of every order with respect to
-    `system` and `speed`.
+    **Returns:** `Point`; if none is found there is no exception (see `Point.status`). The function works under `jit`
+    and `vmap`; value, speed and state have derivatives of every order with respect to `system` and `speed`.
 
     **Raises:** `ValueError` for an unknown kind or parameter, or a guess without a speed.
     """
     require_x64()
     if periods is not None:
         require_at_least(1, periods=periods)
-    if not 0 <= reach < float("inf"):
-        raise ArgumentError("reach", said=f"must be at least 0 and finite, but {reach:g} was given.")
     near = guess if isinstance(guess, Orbit | Point) else None
     periods = (1 if near is None else near.periods) if periods is None else periods
     start = read_start("guess", guess, system, parameter, speed)
-    if near is None and not isinstance(guess, tuple):
-        here = frozen(Given(system, start.speed)).changed(parameter, start.at)
-        settled = periodic_orbit(here.system, here.speed, periods, guess=start.state, revolutions=SPUN, method=method)
-        start = start._replace(state=jnp.where(settled.converged, settled.state, start.state))
     given = Given(system, jnp.asarray(start.speed if speed is None else speed, dtype=float))
 
     def find(begin: Start) -> Point:
@@ -156,31 +146,23 @@ def bifurcation(
         return with_fallback(by, method, lambda point: jnp.all(jnp.isfinite(point.residual)), MOST_OF_A_POINT)
 
     found = find(start)
-    if is_traced((found, given, start)) or not reach or found.status not in ("no such point", "other kind"):
+    if is_traced((found, given, start)) or found.status not in ("no such point", "other kind"):
         return found
-    there, looked = _along_branch(given, parameter, int(periods), start, kind, reach, method)
-    if there is not None:
-        again = find(Start(jnp.asarray(there.state), jnp.asarray(there.speed), jnp.asarray(there.value)))
-        found = again if bool(again.converged) else there  # Newton's method may fail at a kink of the law
-    return found if bool(found.converged) else dataclasses.replace(found, looked=looked)
+    there = _along_branch(given, parameter, int(periods), start, kind, method)
+    if there is None:
+        return found
+    again = find(Start(jnp.asarray(there.state), jnp.asarray(there.speed), jnp.asarray(there.value)))
+    return again if bool(again.converged) else there  # Newton's method may fail at a kink of the law
 
 
 def _along_branch(
-    given: Given,
-    parameter: Parameter,
-    periods: int,
-    begin: Start,
-    kind: str,
-    reach: float,
-    method: AbstractMethod | None,
-) -> tuple[Point | None, str]:
-    """Return the nearest bifurcation of `kind` on the branch through an orbit, or None, and the range searched; this
-    succeeds near superstable orbits, where the scalar of Newton's method is flat."""
+    given: Given, parameter: Parameter, periods: int, begin: Start, kind: str, method: AbstractMethod | None
+) -> Point | None:
+    """Return the nearest bifurcation of `kind` on the branch through an orbit, or None; this succeeds near superstable
+    orbits, where the scalar of Newton's method is flat."""
     at = float(begin.at)
-    away = float(reach) * (abs(at) or 1.0)
+    away = REACH * (abs(at) or 1.0)
     problem = orbit_curves(given, parameter, at - away, at + away, method, periods)
-    say = lambda x: f"{x * 30 / np.pi:.6g} rpm" if parameter == SPEED else f"{x:.6g}"
-    name = "the parameter" if callable(parameter) else parameter
 
     def passed(curve: Path) -> str:
         """Event: the last step passed a point of the kind, and the stability changed."""
@@ -190,12 +172,8 @@ def _along_branch(
         return "stopped" if found else ""
 
     (found,) = follow_both_ways(problem, [(np.asarray(begin.state), at)], WALK, events=(passed,))
-    if found is None:
-        return None, f"no orbit near the guess at {name} = {say(at)} to follow"
-    low, high = (say(float(f(found.value))) for f in (np.min, np.max))
-    looked = f"looked along the branch of its orbit, {name} from {low} to {high} (ends: {', '.join(found.ended)})"
-    mine = [p for p in found.special if p.kind == kind and p.status == "converged"]
-    return min(mine, key=lambda p: abs(p.value - at), default=None), looked
+    mine = [p for p in found.special if p.kind == kind and p.status == "converged"] if found else []
+    return min(mine, key=lambda p: abs(p.value - at), default=None)
 
 
 Solved = tuple[Point, PointEquations, Array]
@@ -245,7 +223,7 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     problem, critical, known = equations.problem, equations.critical, cast(Singular, found.aux)
     finite = jnp.all(jnp.isfinite(known.monodromy))
     multipliers = sorted_multipliers(jnp.where(finite, known.monodromy, 0.0))
-    matches = to_critical(critical, multipliers) < jnp.sqrt(ON_CIRCLE)
+    matches = to_critical(critical, multipliers)[0] < jnp.sqrt(ON_CIRCLE)
     rate = _critical_rate(critical, problem.dimension, found.newton.jacobian, known)
     at, unit = problem.values(u)[0], problem.units[0]
     # The guess is 10 in the parameter's unit; the value itself may be zero.
@@ -256,8 +234,6 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     outcome = jnp.where(found.converged, jnp.where(matches, kept, Outcome.OTHER_KIND), Outcome.NO_SUCH_POINT)
     there = (outcome == Outcome.FOUND) | (outcome == Outcome.TANGENTIAL)
     keep = lambda x: jnp.where(there, x, jnp.nan)
-    direction = jnp.zeros(problem.dimension) if critical is None else known.right
-    length = jnp.linalg.norm(direction)
     return Point(
         **_place(equations, u, given, there),
         error=error,
@@ -265,7 +241,6 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
         multipliers=jnp.where(found.converged, multipliers, jnp.nan),
         residual=jnp.max(jnp.abs(found.newton.residual)),
         transversality=keep(rate / unit),
-        direction=keep(direction / jnp.where(length > 0, length, 1.0) * problem.scale),
         outcome=outcome,
         periods=problem.periods,
         kind="",

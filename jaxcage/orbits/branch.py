@@ -1,42 +1,31 @@
-"""Branches of periodic orbits over a parameter, with their bifurcations, and period-doubling cascades."""
+"""Branches of periodic orbits over a parameter, with their bifurcations."""
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
 from .._pytrees import Scalar
-from ..analysis import Edge
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import AbstractMethod, Rodas4
 from .arclength import Points, StepControl
 from .continuation import (
-    ONCE,
     Continuation,
     ContinuationProblem,
     Event,
     Path,
     Start,
-    correct,
-    first_points,
     orbit_curves,
 )
 from .location import Place, bifurcations_of
 from .orbit import NearOrbit, Orbit
-from .point import CRITICAL, UNEXPLAINED, Outcome, Point, read_start, require_found, test_functions
-from .problem import SETTLED, SPEED, Given, Parameter, name_of
-
-
-FEIGENBAUM = 4.669201609102990
-AMPLITUDE, SMALLEST_AMPLITUDE = 0.02, 1e-5
-"""Distance from the period doubling at which the doubled branch is entered, and the smallest one tried."""
+from .point import UNEXPLAINED, Outcome, Point, read_start
+from .problem import SETTLED, SPEED, Given, Parameter, name_of, without_turns
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,7 +44,7 @@ class Branch:
     ended: tuple[str, str]
     """Reason for each end, first and last: `range`, the branch leaves the range; `closed`; `steps`, the maximum number
     was taken; `stopped`, by another branch or after many unstable orbits; `stuck`, no further orbit was found;
-    `inaccurate`, the error is too large even with the most steps; `doubling`, it begins at a period doubling."""
+    `inaccurate`, the error is too large even with the most steps."""
     steps: Int[np.ndarray, " points"]
     error: Float[np.ndarray, " points"]
 
@@ -157,7 +146,8 @@ def follow_both_ways(
     walk.finished()
     kept = [i for i in range(count) if not taken[i]]
     rows = [_joined(problem, walk.curves[i], walk.curves[i + count]) for i in kept]
-    found = dict(zip(kept, described(problem, rows), strict=True))
+    located = bifurcations_of(problem, [points for points, _ in rows])
+    found = {i: _branch(problem, *one, ended) for i, one, (_, ended) in zip(kept, located, rows, strict=True)}
     return [found.get(i) for i in range(count)]
 
 
@@ -171,14 +161,11 @@ def _joined(problem: ContinuationProblem, up: Path, down: Path) -> tuple[Points,
     row = (up if up.ended == "closed" else down).row
     stable = problem.unstable(row) == 0
     count = stable.size - 1  # the last point is past the first
-    order = (np.arange(count + 1) + int(np.argmin(stable[:-1]))) % count
-    return row.take(order), ("closed", "closed")
-
-
-def described(problem: ContinuationProblem, rows: Sequence[tuple[Points, tuple[str, str]]]) -> list[Branch]:
-    """Return branches from their points and ends, after locating the bifurcations of all at the same time."""
-    found = bifurcations_of(problem, [points for points, _ in rows])
-    return [_branch(problem, *row, ended) for row, (_, ended) in zip(found, rows, strict=True)]
+    order = np.arange(count + 1) + int(np.argmin(stable[:-1]))
+    around = row.u[-1] - row.u[0]
+    turned = np.outer(order // count, around - without_turns(around, problem.turns))  # where angles turn on the way
+    row = row.take(order % count)
+    return row._replace(u=row.u + turned), ("closed", "closed")
 
 
 def _branch(problem: ContinuationProblem, points: Points, places: Sequence[Place], ended: tuple[str, str]) -> Branch:
@@ -198,9 +185,6 @@ def _branch(problem: ContinuationProblem, points: Points, places: Sequence[Place
 def _point(problem: ContinuationProblem, place: Place, edge: bool) -> Point:
     kind, p, unit = place.kind, place.point, problem.units[0]
     assert p is not None
-    direction = np.zeros(problem.scale.size)
-    if kind in CRITICAL:
-        direction = np.linalg.svd(problem.equations.monodromy(p) - CRITICAL[kind] * np.eye(direction.size))[2][-1]
     at, error = float(problem.values(p.u)[0]), place.error * unit
     lost = kind != UNEXPLAINED and error > SETTLED * max(abs(at), unit)
     value = float("nan") if lost else at
@@ -215,108 +199,7 @@ def _point(problem: ContinuationProblem, place: Place, edge: bool) -> Point:
         value,
         error,
         problem.multipliers(p),
-        direction * problem.scale,
         outcome=Outcome.UNEXPLAINED if kind == UNEXPLAINED else Outcome.NOT_CONVERGED if lost else Outcome.FOUND,
         index=place.after,
         edge=edge,
     )
-
-
-# --- period doublings ----------------------------------------------------------------------------------------------
-
-
-@dataclasses.dataclass(frozen=True)
-class Cascade:
-    """Successive period doublings of an orbit, and the parameter value at which they accumulate [SI].
-
-    The limit is extrapolated with Feigenbaum's ratio, and NaN with fewer than two points. Its error is the difference
-    of the last two extrapolations plus the weighted errors of the last two points, and infinite with fewer than three.
-    `ended` is the reason if there are fewer points than requested.
-    """
-
-    points: tuple[Point, ...]
-    limit: float
-    error: float
-    ended: str = ""
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """Parameter values at the period doublings [SI]."""
-        return tuple(float(p.value) for p in self.points)
-
-    def as_edge(self, kind: str) -> Edge:
-        """Return the limit of a cascade over speed as the edge of a chaotic zone."""
-        return Edge(self.limit * 30 / np.pi, self.error * 30 / np.pi, kind, "period-doubling", "cascade")
-
-    def __str__(self) -> str:
-        rows = [
-            f"  period {int(p.periods)} to {2 * int(p.periods)}: {float(p.value):.10g} ± {float(p.error):.1g}"
-            for p in self.points
-        ]
-        last = [f"  ended: {self.ended}"] if self.ended else []
-        return "\n".join(["Period-doubling cascade", *rows, f"  limit {self.limit:.10g} ± {self.error:.1g}", *last])
-
-    _repr_html_ = notebook_html
-
-
-def cascade(
-    system: AbstractForcedSystem,
-    point: Point,
-    parameter: Parameter = SPEED,
-    *,
-    lower: float,
-    upper: float,
-    levels: int = 4,
-    method: AbstractMethod | None = None,
-) -> Cascade:
-    """Follow a period-doubling cascade: each doubled branch up to its own first period doubling.
-
-    **Arguments:** system; first period doubling, of an orbit of any period; parameter and its range [SI]; number of
-    doublings; integration method.
-
-    **Raises:** `ValueError` for a point that is not a period doubling, or was not found.
-    """
-    require_x64()
-    if point.kind != "period-doubling":
-        raise ArgumentError("point", said=f"must be a period doubling, but it is a {point.kind}.")
-    require_found(point)
-    require_at_least(1, levels=levels)
-    given = Given(system, jnp.asarray(point.speed, dtype=float))
-    problem = orbit_curves(given, parameter, lower, upper, method)
-    points, ended = [point], ""
-    while len(points) < levels and not ended:
-        doubled = _doubled(problem, points[-1], AMPLITUDE / 2 ** (len(points) - 1))
-        if doubled is None:
-            ended = f"no doubled branch begins at {float(points[-1].value):g}"
-            break
-        following = [p for p in doubled.special if p.kind == "period-doubling" and p.status == "converged"]
-        if not following:
-            ended = f"the branch of period {doubled.periods} does not double again (ends: {doubled.ended[1]})"
-        points += following[:1]
-    pairs = itertools.pairwise(float(p.value) for p in points)
-    limits = [b + (b - a) / (FEIGENBAUM - 1) for a, b in pairs] or [float("nan")]
-    error = abs(limits[-1] - limits[-2]) if len(limits) > 1 else float("inf")
-    located = sum(w * float(np.nan_to_num(p.error)) for w, p in zip((1 + 1 / (FEIGENBAUM - 1), 0.3), points[::-1]))
-    return Cascade(tuple(points), limits[-1], error + located, ended)
-
-
-def _doubled(problem: ContinuationProblem, point: Point, amplitude: float) -> Branch | None:
-    """Follow the doubled branch from `amplitude` (in units of the scale) along the critical direction to its own first
-    period doubling; None if no branch is found."""
-    at, periods = float(point.value), int(point.periods)
-    problem, half = problem.around(at, 2 * periods), problem.around(at, periods)
-    test = lambda points: test_functions(problem.multipliers(points))["period-doubling"]
-    u = problem.unknowns(point.state, at)[None]
-    across = np.append(np.asarray(point.direction) / problem.scale, 0.0)[None]
-    across /= np.linalg.norm(across)
-    while amplitude > SMALLEST_AMPLITUDE:
-        start = first_points(problem, u + amplitude * across, across, int(point.steps))
-        near = start.converged[0] and abs(start.u[0, -1] - u[0, -1]) < 1.0
-        once = correct(half, start.u, across, start.steps, ONCE)  # one Newton step with half the period
-        away = np.linalg.norm(once.jacobian[0] @ (start.u - once.u)[0])  # zero on the branch of half the period
-        if near and test(start)[0] > 0 and away > amplitude:
-            doubles: Event = lambda path: "stopped" if test(path.points[-1]) < 0 else ""
-            (path,) = Continuation(problem, start, StepControl(first=0.01), (doubles,)).finished()
-            return described(problem, [(path.row, ("doubling", path.ended))])[0]
-        amplitude /= 4
-    return None

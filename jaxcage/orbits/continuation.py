@@ -25,7 +25,20 @@ from .arclength import Points, StepControl
 from .newton import TOLERANCE, AbstractEquations, solve
 from .orbit import OrbitEquations
 from .point import eigenvalues
-from .problem import GIVEN_UP, SETTLED, SPEED, Counts, Given, Parameter, by_rodas4, by_steps, counted, make_problem
+from .problem import (
+    ENDLESS,
+    GIVEN_UP,
+    SETTLED,
+    SPEED,
+    Counts,
+    Given,
+    Parameter,
+    by_rodas4,
+    by_steps,
+    counted,
+    make_problem,
+    without_turns,
+)
 
 
 CHUNK = 8  # points per call: up to eight cost as much as one, since they share vector instructions
@@ -67,11 +80,15 @@ class ContinuationProblem(eqx.Module):
         """Units of the state."""
         return np.asarray(self.equations.problem.scale)
 
-    def around(self, at: Any, periods: Any = None) -> "ContinuationProblem":
-        """Return the problem of orbits in the system's scale at a value of the parameter, with `periods` if given."""
+    @property
+    def turns(self) -> np.ndarray:
+        """Revolutions of the unknowns that are angles."""
+        return np.append(self.equations.problem.turns, np.full(self.units.size, ENDLESS))
+
+    def around(self, at: float) -> "ContinuationProblem":
+        """Return the problem of orbits in the system's scale at a value of the parameter."""
         mine, there = self.equations.problem, self.given.changed(self.parameter, jnp.asarray(at, dtype=float))
-        periods = mine.periods if periods is None else periods
-        problem = make_problem(there, mine.parameters, mine.units, periods, mine.method)
+        problem = make_problem(there, mine.parameters, mine.units, mine.periods, mine.method)
         return dataclasses.replace(self, equations=OrbitEquations(problem))
 
     def by_rodas4(self) -> "ContinuationProblem":
@@ -257,12 +274,14 @@ def solved_again(
 
 @dataclasses.dataclass
 class Path:
-    """State of a curve during continuation: points, length of the next step, `steps` per revolution, number, and reason
-    why it `ended` (see `Branch.ended`), empty if it has not; if `crosses`, the next point may be beyond a crossing."""
+    """State of a curve during continuation: points, length of the next step, `steps` per revolution, `turns` of the
+    unknowns that are angles, number, and reason why it `ended` (see `Branch.ended`), empty if it has not; if `crosses`,
+    the next point may be beyond a crossing."""
 
     points: list[Points]
     length: float
     steps: int
+    turns: np.ndarray
     number: int = 0
     ended: str = ""
     crosses: bool = False
@@ -272,10 +291,11 @@ class Path:
         return Points.stacked(self.points)
 
     def passes(self, places: Float[np.ndarray, "places n"]) -> bool:
-        """Return True if the last step goes through any of these places, to the accuracy of the chord."""
-        begin, step = self.points[-2].u, self.points[-1].u - self.points[-2].u
-        share = (places - begin) @ step / np.dot(step, step)
-        off = np.linalg.norm(begin + share[:, None] * step - places, axis=1)
+        """Return True if the last step goes through any of these places, or whole revolutions of the angles from it, to
+        the accuracy of the chord."""
+        step, way = self.points[-1].u - self.points[-2].u, without_turns(places - self.points[-2].u, self.turns)
+        share = way @ step / np.dot(step, step)
+        off = np.linalg.norm(share[:, None] * step - way, axis=1)
         return bool(np.any((share > 0) & (share <= 1) & (off < 0.2 * np.linalg.norm(step))))
 
 
@@ -317,8 +337,8 @@ class Continuation:
         self.chooses = problem.counts.chooses
         self.least, self.most = int(problem.counts.first), int(problem.counts.last)
         self.curves = [
-            Path([start.take(i)], control.first, int(start.steps[i]), i, "" if start.converged[i] else "stuck")
-            for i in range(len(start.u))
+            Path([start.take(i)], control.first, int(steps), problem.turns, i, "" if start.converged[i] else "stuck")
+            for i, steps in enumerate(start.steps)
         ]
 
     def finished(self) -> list[Path]:

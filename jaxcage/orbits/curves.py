@@ -31,8 +31,10 @@ from .problem import ENOUGH, SPEED, Given, Parameter, counted, make_problem, val
 
 
 SHARE = "share"
-LONGEST, SHORTEST, MOST = 1.5, 1e-6, 80
-"""Longest and shortest step, in clearances and tenths of the speed and of the largest relative change; most steps."""
+LONGEST, SHORTEST, MOST = 1.5, 1e-8, 300
+"""Longest and shortest step, in clearances and tenths of the speed and of the largest relative change; most steps.
+Where an orbit begins to graze the land, the curve turns within a small part of the length over which contact sets in.
+"""
 LEAST = 1e-10  # designs that differ by less are the same up to rounding
 SAME_EDGE = 2e-3
 """Largest relative distance between the end of the curve and the edge solved for at the new design."""

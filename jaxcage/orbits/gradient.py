@@ -9,7 +9,7 @@ All derivatives follow from the equations of an edge or of an orbit by the impli
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import NamedTuple, cast, get_args
 
 import equinox as eqx
@@ -19,14 +19,12 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from .._arguments import require_x64
-from .._errors import ArgumentError
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
 from .._pytrees import compiled
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import AbstractMethod
 from .bifurcation import PointEquations, Solved, solve_point
-from .branch import FEIGENBAUM, Cascade
 from .continuation import in_parallel
 from .newton import as_root
 from .orbit import Orbit, OrbitEquations, sorted_multipliers
@@ -44,9 +42,9 @@ class Sensitivity:
 
     `derivative` is d value [rpm] / d parameter [SI], `elasticity` the relative change of the value over that of the
     parameter, and `homogeneity` the relative residuals of the identities for mass, length and time, NaN if a
-    parameter's unit is not known. `transversality` is d|mu|/d speed [s] (see `Point`), for a width or a limit the
-    smallest one; `error_rpm` is the change of the value when the `steps` per revolution are halved. The `state` of the
-    orbit at phase 0 [SI] is None for a width or a limit.
+    parameter's unit is not known. `transversality` is d|mu|/d speed [s] (see `Point`), for a width the
+    smaller one; `error_rpm` is the change of the value when the `steps` per revolution are halved. The `state` of the
+    orbit at phase 0 [SI] is None for a width.
     """
 
     name: str
@@ -161,39 +159,21 @@ def sensitivities(
     return dict(zip(points, found, strict=True))
 
 
-def limit_sensitivity(
-    system: AbstractForcedSystem, cascade: Cascade, name: str = "limit", method: AbstractMethod | None = None
-) -> Sensitivity:
-    """Return the sensitivity of the speed at which a cascade accumulates, extrapolated in the same way as the speed.
-
-    **Raises:** `ValueError` for a cascade over a parameter other than speed, or of fewer than two points.
-    """
-    if len(cascade.points) < 2 or any(p.parameter != SPEED for p in cascade.points):
-        raise ArgumentError("cascade", said=f"must have two points over speed, but has {len(cascade.points)}.")
-    before, last = (sensitivity(system, p, name, method) for p in cascade.points[-2:])
-    return _combined(name, "period-doubling", ((1 + 1 / (FEIGENBAUM - 1), last), (-1 / (FEIGENBAUM - 1), before)))
-
-
 def width(onset: Sensitivity, exit_: Sensitivity, name: str = "width") -> Sensitivity:
     """Return the sensitivity of the width between two edges."""
-    return _combined(name, "unstable", ((1.0, exit_), (-1.0, onset)))
-
-
-def _combined(name: str, kind: str, parts: Sequence[tuple[float, Sensitivity]]) -> Sensitivity:
-    """Return the sensitivity of a weighted sum of edges."""
-    total = sum(w * s.value_rpm for w, s in parts)
-    first = parts[0][1]
-    weighted = lambda rows: sum(w * s.value_rpm * row for (w, s), row in zip(parts, rows, strict=True)) / total
+    total, first, last = exit_.value_rpm - onset.value_rpm, onset.value_rpm, exit_.value_rpm
+    difference = lambda a, b: {n: b[n] - a[n] for n in a}
+    relative = lambda a, b: {n: (last * b[n] - first * a[n]) / total for n in a}
     return Sensitivity(
         name=name,
-        kind=kind,
+        kind="unstable",
         value_rpm=total,
-        derivative={n: sum(w * s.derivative[n] for w, s in parts) for n in first.derivative},
-        elasticity={n: weighted([s.elasticity[n] for _, s in parts]) for n in first.elasticity},
-        homogeneity={b: weighted([s.homogeneity[b] for _, s in parts]) for b in first.homogeneity},
-        transversality=min(abs(s.transversality) for _, s in parts),
-        status=next((s.status for _, s in parts if not s.trusted), "converged"),
-        error_rpm=sum(abs(w) * s.error_rpm for w, s in parts),
+        derivative=difference(onset.derivative, exit_.derivative),
+        elasticity=relative(onset.elasticity, exit_.elasticity),
+        homogeneity=relative(onset.homogeneity, exit_.homogeneity),
+        transversality=min(abs(onset.transversality), abs(exit_.transversality)),
+        status=next((s.status for s in (exit_, onset) if not s.trusted), "converged"),
+        error_rpm=onset.error_rpm + exit_.error_rpm,
     )
 
 

@@ -7,6 +7,7 @@ planes across the chord between two orbits. All bifurcations are located at the 
 import dataclasses
 import itertools
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -15,7 +16,7 @@ from jaxtyping import Float
 
 from .arclength import Points
 from .continuation import ContinuationProblem, correct, solved_again
-from .point import COMPLEX, UNEXPLAINED, critical_of, test_functions, to_critical
+from .point import COMPLEX, DOUBLE, UNEXPLAINED, critical_of, test_functions, to_critical
 from .problem import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
 
 
@@ -64,8 +65,9 @@ def bifurcations_of(problem: ContinuationProblem, rows: Sequence[Points]) -> lis
 
     If the number of unstable multipliers changes in a way that the detected bifurcations do not explain, as when two
     real multipliers pass -1 within a step, the step is halved. If the located bifurcations do not explain it, the
-    orbits are solved for again and the bifurcations located once more. A change that is still not explained has the
-    kind `unexplained`: the curve may not be a branch there.
+    orbits are solved for again and the bifurcations located once more. If a change is still not explained, two
+    multipliers or pairs may cross together (`DOUBLE`). Otherwise it has the kind `unexplained`: the curve may not be a
+    branch there.
     """
     steep = [np.flatnonzero(np.max(np.abs(row.jacobian), axis=(1, 2)) > STEEP) for row in rows]
     at_root = [solved_again(problem, row, k, row.steps[k]) for row, k in zip(rows, steep, strict=True)]
@@ -79,13 +81,22 @@ def bifurcations_of(problem: ContinuationProblem, rows: Sequence[Points]) -> lis
     found = []
     for i in range(len(rows)):
         rows[i], places[i] = row, mine = _parted(problem, rows[i], places[i])
-        for a, b in gaps(i):
-            k = a + int(np.argmax(np.diff(problem.unstable(row)[a : b + 1]) != 0))
+        for k, *_ in _changes(problem, row, gaps(i)):
+            double = [Place(row, k, kind) for kind in DOUBLE if _is_there(problem, Place(row, k, kind, row.take(k)))]
+            _locate(problem, double)
+            mine += [p for p in double if _is_there(problem, p)][:1]
+        for k, a, b in _changes(problem, row, gaps(i)):
             far = float(np.max(np.abs(np.diff(row.u[a : b + 1, -1]))))
             middle = row.take(k)._replace(u=(row.u[k] + row.u[k + 1]) / 2)
             mine.append(Place(row, k, UNEXPLAINED, middle, far))
         found.append((row, _in_order(row, mine)))
     return found
+
+
+def _changes(problem: ContinuationProblem, row: Points, gaps: Sequence[tuple[int, int]]) -> list[tuple[int, int, int]]:
+    """Return the orbit before the first change in the number of unstable multipliers in each gap, and the gap."""
+    change = np.diff(problem.unstable(row)) != 0
+    return [(a + int(np.argmax(change[a:b])), a, b) for a, b in gaps]
 
 
 # --- orbits of a branch --------------------------------------------------------------------------------------------
@@ -158,6 +169,16 @@ def _signals(problem: ContinuationProblem, points: Points) -> dict[str, np.ndarr
     return tests
 
 
+def _signal(problem: ContinuationProblem, points: Points, kind: str) -> Any:
+    """Return the function that changes sign at a bifurcation of one kind; for those that cross together, the sum of the
+    logarithms of the multipliers nearest the unit circle."""
+    if kind not in DOUBLE:
+        return _signals(problem, points)[kind]
+    growth = np.log(np.abs(problem.multipliers(points)))
+    nearest = np.argsort(np.abs(growth), axis=-1)[..., : DOUBLE[kind]]
+    return np.sum(np.take_along_axis(growth, nearest, axis=-1), axis=-1)
+
+
 def sign_changes(problem: ContinuationProblem, row: Points) -> list[tuple[int, str]]:
     """Return the preceding orbit and the kind for each change of sign of a test function."""
     values = _signals(problem, row)
@@ -170,7 +191,7 @@ def _gaps(problem: ContinuationProblem, row: Points, seen: Sequence[tuple[int, s
     clear = np.flatnonzero(problem.unstable(row, 1 + CLEAR) == problem.unstable(row, 1 - CLEAR))
     found = []
     for a, b in itertools.pairwise(clear.tolist()):
-        crossing = sum(2 if kind == "Neimark-Sacker" else 1 for k, kind in seen if a <= k < b)
+        crossing = sum(DOUBLE.get(kind, 2 if kind == "Neimark-Sacker" else 1) for k, kind in seen if a <= k < b)
         change = abs(int(count[b] - count[a]))
         if change > crossing or (crossing - change) % 2:
             found.append((a, b))
@@ -219,14 +240,17 @@ def _located(problem: ContinuationProblem, rows: Sequence[Points]) -> list[list[
     """Return the bifurcations on each branch that were detected and located."""
     places = [[Place(row, k, kind) for k, kind in sign_changes(problem, row)] for row in rows]
     _locate(problem, [p for mine in places for p in mine])
+    return [[p for p in mine if _is_there(problem, p)] for mine in places]
 
-    def is_there(p: Place) -> bool:
-        if p.point is None:
-            return False
-        near = 1e-4 if p.kind == "Neimark-Sacker" else 1e-3  # a double multiplier is accurate to sqrt(rounding)
-        return bool(to_critical(critical_of(p.kind), jnp.asarray(problem.multipliers(p.point))) < near)
 
-    return [[p for p in mine if is_there(p)] for mine in places]
+def _is_there(problem: ContinuationProblem, p: Place) -> bool:
+    """Return True if the multipliers at a place are critical for its kind."""
+    if p.point is None:
+        return False
+    near = 1e-4 if p.kind == "Neimark-Sacker" else 1e-3  # a double multiplier is accurate to sqrt(rounding)
+    off = np.asarray(to_critical(critical_of(p.kind), jnp.asarray(problem.multipliers(p.point))))
+    count = DOUBLE.get(p.kind, 1)
+    return off.size >= count and bool(off[count - 1] < near)
 
 
 def _locate(problem: ContinuationProblem, places: Sequence[Place]) -> None:
@@ -306,7 +330,7 @@ class _RegulaFalsi:
     """Regula falsi (Illinois variant) for one test function between two points of a branch."""
 
     def __init__(self, problem: ContinuationProblem, kind: str, within: float, ends: Points):
-        self.signal = lambda points: _signals(problem, points)[kind]
+        self.signal = lambda points: _signal(problem, points, kind)
         self.within, self.sides = within, [ends.take(0), ends.take(1)]
         self.chord = ends.u[1] - ends.u[0]
         self.begin, self.length = ends.u[0], float(np.linalg.norm(self.chord))

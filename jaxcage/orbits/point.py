@@ -29,8 +29,17 @@ from .problem import SPEED, Parameter, frozen, is_traced, value_of
 
 Kind = Literal["period-doubling", "Neimark-Sacker", "fold"]
 """Kinds of bifurcation that Newton's method solves for; a branch may also have branch points."""
-CRITICAL = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}
+CRITICAL = {
+    "period-doubling": -1.0,
+    "fold": 1.0,
+    "branch-point": 1.0,
+    "double period-doubling": -1.0,
+    "double branch-point": 1.0,
+}
 """Critical multiplier of each kind that has a real one."""
+DOUBLE = {"double period-doubling": 2, "double branch-point": 2, "double Neimark-Sacker": 4}
+"""Kinds at which two real multipliers or two complex pairs cross the unit circle together, as by a symmetry, and the
+number of these multipliers."""
 COMPLEX = 1e-5
 """Smallest imaginary part of a complex multiplier; that of a double real one may reach the square root of rounding."""
 
@@ -90,12 +99,16 @@ def test_functions(multipliers: Complex[np.ndarray, "*points n"]) -> dict[str, F
     }
 
 
-def to_critical(critical: Float[Array, ""] | None, multipliers: Complex[Array, " n"]) -> Float[Array, ""]:
-    """Return the distance of the nearest multiplier from the critical one or, if None, of a complex pair from the unit
-    circle; a real pair whose product is 1 is a neutral saddle and does not count."""
+def to_critical(
+    critical: Float[Array, ""] | None, multipliers: Complex[Array, "*points n"]
+) -> Float[Array, "*points n"]:
+    """Return the distances of the multipliers from the critical one, the smallest first, or, if that is None, of those
+    of complex pairs from the unit circle; a real pair whose product is 1 is a neutral saddle and does not count."""
     if critical is None:
-        return jnp.min(jnp.where(jnp.abs(multipliers.imag) > COMPLEX, jnp.abs(jnp.abs(multipliers) - 1), jnp.inf))
-    return jnp.min(jnp.abs(multipliers - critical))
+        off = jnp.where(jnp.abs(multipliers.imag) > COMPLEX, jnp.abs(jnp.abs(multipliers) - 1), jnp.inf)
+    else:
+        off = jnp.abs(multipliers - critical)
+    return jnp.sort(off, axis=-1)
 
 
 def eigenvalues(monodromy: np.ndarray) -> np.ndarray:
@@ -124,21 +137,20 @@ class Outcome(enum.IntEnum):
 class Point(eqx.Module):
     """A bifurcation of a periodic orbit; if none was found, its numbers are NaN (see `status`).
 
-    - `kind`: `period-doubling`, `Neimark-Sacker`, `fold` or `branch-point`; on a branch also `unexplained`: the number
-        of unstable multipliers changes but no bifurcation is found, so that one was missed, or the curve is not one
-        branch. Kind, speed and state are a sufficient guess for Newton's method.
+    - `kind`: `period-doubling`, `Neimark-Sacker`, `fold` or `branch-point`; on a branch also one of `DOUBLE`, at which
+        two cross together, and `unexplained`: the number of unstable multipliers changes but no bifurcation is found,
+        so that one was missed, or the curve is not one branch. Kind, speed and state of one of the first three are a
+        sufficient guess for Newton's method.
     - `speed` [rad/s], `state` at phase 0 [SI] and `value` of the `parameter` [SI], which may be the speed, are
         differentiable. `periods`: revolutions after which the orbit closes; `steps`: steps per revolution.
     - `error`: change of the value with half the steps or, if larger, twice the change with an odd number near three
         quarters of them [SI]; infinite if these do not find it, NaN if the method has no number of steps; for an
         unexplained change the distance within which it lies. Under `jit`, `vmap` and `grad` only half are tried.
-    - `direction`: critical direction in the state [SI], of length 1 in units of the scale; zero for a Neimark-Sacker
-        bifurcation. `residual`: largest component of the equations, in units of the scale.
+    - `residual`: largest component of the equations, in units of the scale.
     - `transversality`: d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is
         infinite, the drift p dP/d parameter of the map along the critical direction, with p q = 1. It is not computed
         on a branch.
     - `index`, `edge`, on a branch: the orbit before the point; True if a stable orbit is on one side of it.
-    - `looked`: description of the search, if neither Newton's method nor continuation found it.
     """
 
     kind: str = eqx.field(static=True)
@@ -150,13 +162,11 @@ class Point(eqx.Module):
     value: Scalar = float("nan")
     error: Scalar = float("nan")
     multipliers: Complex[Numbers, " multipliers"] = eqx.field(default_factory=lambda: np.zeros(0, dtype=complex))
-    direction: Float[Numbers, " coordinates"] = eqx.field(default_factory=lambda: np.zeros(0))
     residual: Scalar = float("nan")
     transversality: Scalar = float("nan")
     outcome: Int[Array, ""] | int = Outcome.GIVEN.value
     index: int = eqx.field(static=True, default=-1)
     edge: bool = eqx.field(static=True, default=False)
-    looked: str = eqx.field(static=True, default="")
 
     def __post_init__(self) -> None:
         if self.parameter == SPEED:
@@ -188,7 +198,7 @@ class Point(eqx.Module):
         target, mu = CRITICAL.get(self.kind), np.asarray(self.multipliers)
         if target is not None:
             return complex(mu[np.argmin(np.abs(mu - target))])
-        mu = mu[np.imag(mu) > 0] if self.kind == "Neimark-Sacker" else mu
+        mu = mu[np.imag(mu) > 0] if self.kind.endswith("Neimark-Sacker") else mu
         return complex(mu[np.argmin(np.abs(np.abs(mu) - 1))])
 
     @property
@@ -210,9 +220,8 @@ class Point(eqx.Module):
         if self.status == "given":
             return f"{self.kind} near {float(self.speed_rpm):.3f} rpm, not solved for yet"
         if not bool(self.converged):
-            looked = f"; {self.looked}" if self.looked else ""
-            return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e}){looked}"
-        angle = f", angle {np.degrees(self.angle):.2f} deg" if self.kind == "Neimark-Sacker" else ""
+            return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e})"
+        angle = f", angle {np.degrees(self.angle):.2f} deg" if self.kind.endswith("Neimark-Sacker") else ""
         error = f" ± {float(self.error_rpm):.1g}" if self.parameter == SPEED else ""
         return (
             f"{self.kind} at {float(self.speed_rpm):.3f}{error} rpm, {self.parameter} = {float(self.value):.9g} "
@@ -240,9 +249,7 @@ class Start(NamedTuple):
 def read_start(
     name: str, guess: Any, system: AbstractForcedSystem, parameter: Parameter, speed: Scalar | None
 ) -> Start:
-    """Return state, speed and value of an orbit, a point, a pair (state, value), or a value, without derivatives.
-
-    For a value alone the state is the first of the system's initial states.
+    """Return state, speed and value of an orbit, a point, or a pair (state, value), without derivatives.
 
     **Raises:** `ArgumentError`, for the argument called `name`, if it is none of these or has no speed.
     """
@@ -256,8 +263,8 @@ def read_start(
             at = guess.value
     else:
         state, at = guess if isinstance(guess, tuple) and len(guess) == 2 else (None, guess)
-    if wrong(Scalar, at):
-        said = "must be a number, a state and a number, an `Orbit` or a `Point`"
+    if state is None or wrong(Scalar, at):
+        said = "must be a state and a number, an `Orbit` or a `Point`"
         raise ArgumentError(name, said=f"{said}, but {shown(guess)} was given.")
     speed = at if parameter == SPEED else speed
     if speed is None:

@@ -19,13 +19,14 @@ import equinox as eqx
 import jax
 import jax.extend as jex
 import jax.numpy as jnp
+import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
 from .._parameters import Parameter as Parameter, pick as pick
 from .._pytrees import Scalar
 from ..models import AbstractForcedSystem
-from ..solve import AbstractMethod, FixedSteps, StrobeMap, method as make_method, strobe_map
+from ..solve import REVOLUTION, AbstractMethod, FixedSteps, StrobeMap, method as make_method, strobe_map
 
 
 SPEED = "speed"
@@ -36,9 +37,20 @@ GIVEN_UP = 2048  # if this many steps find nothing, more are not tried
 IMAGE, SLOPE = 1e-6, 1e-3
 """Largest change of the map, in units of the system's scale, and of its derivative, relative to one plus its size,
 between an orbit's steps and half as many."""
+ENDLESS = 1e100  # revolution of a component that is no angle
 POINT = 1e-7  # largest relative change of the value of a bifurcation
 SETTLED = 2e-4  # a point with a larger relative change, or an orbit with a larger error, counts as not found
 BY_OTHERS = 2.0  # the stated error of a point is at least this many times its change with `other_steps`
+
+
+def turns_of(angles: Sequence[int], dimension: int) -> Float[np.ndarray, " dim"]:
+    """Return 2 pi for each component of a state that is an angle, and a number beyond all others for the rest."""
+    return np.where(np.isin(np.arange(dimension), angles), REVOLUTION, ENDLESS)
+
+
+def without_turns(way: Any, turns: Any) -> Any:
+    """Return differences of states without whole revolutions of the angles; arrays of JAX or NumPy."""
+    return way - turns * (way / turns).round()
 
 
 def value_of(system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> Array:
@@ -93,6 +105,8 @@ class OrbitProblem(eqx.Module):
     """Units of the free parameters."""
     periods: Int[Array, ""]
     """Revolutions after which the orbit closes."""
+    angles: tuple[int, ...] = eqx.field(static=True)
+    """Indices of the coordinates that are angles."""
 
     @property
     def dimension(self) -> int:
@@ -105,6 +119,15 @@ class OrbitProblem(eqx.Module):
     def state(self, u: Float[Array, " n"]) -> Float[Array, " dim"]:
         """Return the state at phase 0 [SI]."""
         return u[: self.dimension] * self.scale
+
+    @property
+    def turns(self) -> Float[Array, " dim"]:
+        """Revolutions of the components that are angles (see `turns_of`), in units of the state."""
+        return turns_of(self.angles, self.dimension) / self.scale
+
+    def moved(self, u: Float[Array, " n"], image: Float[Array, " dim"]) -> Float[Array, " dim"]:
+        """Return the motion from the unknowns u to the image of the map, without whole revolutions of the angles."""
+        return without_turns(image - u[: self.dimension], self.turns)
 
     def at(self, u: Float[Array, " n"], given: Given) -> Given:
         """Return system and speed at the unknowns u."""
@@ -152,7 +175,7 @@ def make_problem(
     """Return the problem in units of the system's scale at the given speed."""
     scale = jnp.stack([jnp.asarray(c, dtype=float) for c in given.system.scale(given.speed)])
     numbers = frozen((scale, jnp.asarray(units, dtype=float), jnp.asarray(periods, dtype=int)))
-    return OrbitProblem(method, parameters, *numbers)
+    return OrbitProblem(method, parameters, *numbers, given.system.angles)
 
 
 # --- steps per revolution -------------------------------------------------------------------------------------------

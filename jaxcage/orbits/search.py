@@ -24,7 +24,7 @@ from .arclength import StepControl
 from .branch import Branch, follow_both_ways
 from .continuation import ContinuationProblem, orbit_curves
 from .point import Point
-from .problem import SPEED, Given
+from .problem import SPEED, Given, turns_of, without_turns
 
 
 ROUND, ROUNDS = 4, 8  # branches followed at a time, and maximum number of rounds
@@ -37,8 +37,14 @@ NEARLY = 0.1  # largest motion over the last revolution, in units of the scale, 
 SHORT: dict[str, Any] = {"revolutions": 8, "blocks": 1, "keep": 8, "exponents": 0}
 """Settings of the simulations, which only provide guesses."""
 Progress = Callable[[str, int, int], None]
-Scale = Callable[[float], np.ndarray]
-"""Units of the state at a speed [rad/s]."""
+Apart = Callable[[np.ndarray, np.ndarray, float], float]
+"""Distance of two states at a speed [rad/s], in units of the system's scale."""
+
+
+def _distance_in(system: AbstractForcedSystem) -> Apart:
+    scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
+    turns = turns_of(system.angles, system.dimension)
+    return lambda one, other, speed: float(np.max(np.abs(without_turns(one - other, turns)) / scale(speed)))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -85,10 +91,10 @@ class StableRange:
         """Return the state of the orbit at a speed [rad/s] within the range, by linear interpolation."""
         return np.array([np.interp(speed, self.speeds, c) for c in self.states.T])
 
-    def holds(self, speed: float, state: np.ndarray, scale: np.ndarray) -> bool:
+    def holds(self, speed: float, state: np.ndarray, apart: Apart) -> bool:
         """Return True if the orbit `state` at `speed` lies on it, to the accuracy of the steps of a continuation."""
         inside = self.lower_rpm <= speed * 30 / np.pi <= self.upper_rpm
-        return inside and bool(np.max(np.abs(self.state_at(speed) - state) / scale) < ON_BRANCH)
+        return inside and apart(self.state_at(speed), state, speed) < ON_BRANCH
 
     def __str__(self) -> str:
         end = lambda p, rpm: f"{rpm:.1f} ({'range' if p is None else p.kind})"
@@ -111,16 +117,17 @@ class SynchronousOrbits:
     missed: int
     lower_rpm: float
     upper_rpm: float
+    angles: tuple[int, ...] = ()
 
     @property
     def edges(self) -> tuple[Point, ...]:
         """Bifurcations at which a stable synchronous orbit ends, by speed."""
-        return _distinct([p for s in self.stretches for p in (s.lower, s.upper) if p is not None])
+        return _distinct([p for s in self.stretches for p in (s.lower, s.upper) if p is not None], self.angles)
 
     @property
     def points(self) -> tuple[Point, ...]:
         """All bifurcations on all branches, by speed."""
-        return _distinct([p for b in self.branches for p in b.special])
+        return _distinct([p for b in self.branches for p in b.special], self.angles)
 
     @property
     def unsettled(self) -> int:
@@ -138,7 +145,7 @@ class SynchronousOrbits:
         found: list[tuple[int, bool, np.ndarray, np.ndarray]] = []
         for i, b in enumerate(self.branches):
             for stable, state, multipliers in _crossings(b, speed):
-                if not any(np.allclose(state, other, rtol=1e-2) for _, _, other, _ in found):  # parts may overlap
+                if not any(_same(state, other, self.angles, 1e-2) for _, _, other, _ in found):  # parts may overlap
                     found.append((i, stable, state, multipliers))
         return found
 
@@ -160,13 +167,17 @@ def _crossings(branch: Branch, speed: float) -> list[tuple[bool, np.ndarray, np.
     return found
 
 
-def _distinct(points: Sequence[Point]) -> tuple[Point, ...]:
+def _same(state: np.ndarray, other: np.ndarray, angles: Sequence[int], tolerance: float) -> bool:
+    return np.allclose(other + without_turns(state - other, turns_of(angles, state.size)), other, tolerance)
+
+
+def _distinct(points: Sequence[Point], angles: Sequence[int]) -> tuple[Point, ...]:
     """Return converged points by speed, without duplicates."""
     kept: list[Point] = []
     for p in sorted((p for p in points if p.status == "converged"), key=lambda p: p.value):
         apart = lambda q: max(1e-6 * p.value, float(np.nan_to_num(p.error + q.error)))
-        same = lambda q: q.kind == p.kind and abs(q.value - p.value) < apart(q) and np.allclose(q.state, p.state, 1e-3)
-        if not any(same(q) for q in kept[-6:]):
+        near = [q for q in kept[-6:] if q.kind == p.kind and abs(q.value - p.value) < apart(q)]
+        if not any(_same(q.state, p.state, angles, 1e-3) for q in near):
             kept.append(p)
     return tuple(kept)
 
@@ -192,7 +203,7 @@ def synchronous_orbits(
     """
     require_at_least(1, count=count)
     say = progress or (lambda what, done, of: None)
-    scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
+    apart = _distance_in(system)
 
     def simulate(speeds: np.ndarray, sign: float) -> xr.Dataset:
         initial_states, told = sign * states_at(system, speeds, None), lambda done, of: say("simulations", done, of)
@@ -207,8 +218,8 @@ def synchronous_orbits(
     if met := _finished(settled):
         i, j = met[len(met) // 2]
         problem = problem.with_stable_steps((settled["last"].values[i, j], float(speeds[i])))
-    orbits = _stable_orbits(problem, settled, scale)
-    waiting = sorted(orbits + _stable_orbits(problem, opposite, scale), key=lambda o: o.speed)
+    orbits = _stable_orbits(problem, settled, apart)
+    waiting = sorted(orbits + _stable_orbits(problem, opposite, apart), key=lambda o: o.speed)
     branches: list[Branch] = []
     for turn in range(ROUNDS):
         if not waiting:
@@ -217,14 +228,14 @@ def synchronous_orbits(
         picked = np.unique(np.linspace(0, len(waiting) - 1, min(ROUND, len(waiting))).round().astype(int))
         guesses = [(waiting[i].state, waiting[i].speed) for i in picked]
         branches += [b for b in follow_both_ways(problem, guesses, StepControl(most=1500), PATIENCE) if b is not None]
-        waiting = [w for w in waiting if not any(_covers(b, w.speed, w.state, scale) for b in branches)]
+        waiting = [w for w in waiting if not any(_covers(b, w.speed, w.state, apart) for b in branches)]
     say("branches", ROUNDS, ROUNDS)
-    families, stretches, limits = _families(branches, scale), [], (lower * 30 / np.pi, upper * 30 / np.pi)
-    for part in _merged([p for i, b in enumerate(branches) for p in _stable_parts(b, i, limits)], scale):
-        met = [o.start for o in orbits if o.settled and part.holds(o.speed, o.state, scale(o.speed))]
+    families, stretches, limits = _families(branches, apart), [], (lower * 30 / np.pi, upper * 30 / np.pi)
+    for part in _merged([p for i, b in enumerate(branches) for p in _stable_parts(b, i, limits)], apart):
+        met = [o.start for o in orbits if o.settled and part.holds(o.speed, o.state, apart)]
         known = {"family": families[part.branch], "met": len(met), "met_first": met.count(0)}
         stretches.append(dataclasses.replace(part, **known))
-    return SynchronousOrbits(tuple(branches), tuple(stretches), settled, len(waiting), *limits)
+    return SynchronousOrbits(tuple(branches), tuple(stretches), settled, len(waiting), *limits, system.angles)
 
 
 # --- orbits from simulations ---------------------------------------------------------------------------------------
@@ -244,36 +255,37 @@ def _finished(settled: xr.Dataset) -> list[list[int]]:
     return np.argwhere(np.all(np.isfinite(settled["last"].values), axis=-1)).tolist()
 
 
-def _stable_orbits(problem: ContinuationProblem, settled: xr.Dataset, scale: Scale) -> list[_Settled]:
+def _stable_orbits(problem: ContinuationProblem, settled: xr.Dataset, apart: Apart) -> list[_Settled]:
     """Return the stable orbits to which Newton's method converges from the ends of simulations, by speed."""
     lanes = _finished(settled)
-    last, speeds = settled["last"].values, settled["speed"].values
+    turns = turns_of(problem.given.system.angles, problem.scale.size)
+    last, speeds = without_turns(settled["last"].values, turns), settled["speed"].values
     met = [(last[i, j], float(speeds[i])) for i, j in lanes]
     if not met:
         return []
     problem = problem.around(met[0][1])
     strobe = settled["strobe"].values
     moved = strobe[..., -1, :] - strobe[..., -2, :] if strobe.shape[2] > 1 else np.zeros_like(last)
-    near = np.max(np.abs(moved / settled["scale"].values), axis=-1) < NEARLY
+    near = np.max(np.abs(without_turns(moved, turns) / settled["scale"].values), axis=-1) < NEARLY
     points = problem.orbits_near(met, np.array([near[i, j] for i, j in lanes]))
     good = points.converged.copy()
     good[good] = problem.unstable(points.take(good)) == 0
     states = problem.states(points.u)
-    apart = [np.max(np.abs(y - x) / scale(at)) for x, (y, at) in zip(states, met, strict=True)]
-    return [_Settled(states[i], met[i][1], lanes[i][1], bool(apart[i] < ON_BRANCH)) for i in np.flatnonzero(good)]
+    near = lambda i: apart(states[i], *met[i]) < ON_BRANCH
+    return [_Settled(states[i], met[i][1], lanes[i][1], near(i)) for i in np.flatnonzero(good)]
 
 
-def _covers(branch: Branch, speed: float, state: np.ndarray, scale: Scale) -> bool:
-    return any(np.max(np.abs(s - state) / scale(speed)) < ON_BRANCH for _, s, _ in _crossings(branch, speed))
+def _covers(branch: Branch, speed: float, state: np.ndarray, apart: Apart) -> bool:
+    return any(apart(s, state, speed) < ON_BRANCH for _, s, _ in _crossings(branch, speed))
 
 
-def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
+def _families(branches: Sequence[Branch], apart: Apart) -> list[int]:
     """Number branches so that parts of one have the same number: the end of a stopped part lies on another part."""
     family = list(range(len(branches)))
     for i, b in enumerate(branches):
         for end, why in zip((0, -1), b.ended, strict=True):
             for j, other in enumerate(branches):
-                if why == "stopped" and i != j and _covers(other, float(b.speed[end]), b.state[end], scale):
+                if why == "stopped" and i != j and _covers(other, float(b.speed[end]), b.state[end], apart):
                     family = [family[j] if f == family[i] else f for f in family]
     return family
 
@@ -299,14 +311,14 @@ def _stable_parts(branch: Branch, number: int, limits: tuple[float, float]) -> l
     return found
 
 
-def _merged(parts: Sequence[StableRange], scale: Scale) -> list[StableRange]:
+def _merged(parts: Sequence[StableRange], apart: Apart) -> list[StableRange]:
     """Join the parts that two branches from different initial states share."""
     whole: list[StableRange] = []
     for b in sorted(parts, key=lambda p: p.lower_rpm):
         for i, a in enumerate(whole):
             rpm = (b.lower_rpm + min(a.upper_rpm, b.upper_rpm)) / 2
             speed = rpm * np.pi / 30
-            if b.lower_rpm <= rpm and a.holds(speed, b.state_at(speed), scale(speed)):
+            if b.lower_rpm <= rpm and a.holds(speed, b.state_at(speed), apart):
                 beyond, top = b.speeds > a.speeds[-1], b if b.upper_rpm > a.upper_rpm else a
                 speeds, states = np.append(a.speeds, b.speeds[beyond]), np.vstack([a.states, b.states[beyond]])
                 ends = {"upper": top.upper, "upper_rpm": top.upper_rpm}
@@ -333,24 +345,24 @@ def stable_range(
     **Returns:** `StableRange`, or None if no stable orbit was found in the operating range. An end is also None if the
     stability changes within the limits but no bifurcation was located there.
     """
-    scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
+    apart = _distance_in(system)
     problem = orbit_curves(Given(system, jnp.asarray(sum(limits) / 2)), SPEED, *limits, method)
     if near:
         waiting = [_Settled(np.asarray(state), float(speed), 0, True) for state, speed in near]
     else:
         settled = sweep(system, np.linspace(*operating, 5), discard=250, **SHORT, method=method)
-        waiting = _stable_orbits(problem, settled, scale)
+        waiting = _stable_orbits(problem, settled, apart)
     parts: list[StableRange] = []
     for _ in range(TRIES):
         if not waiting:
             break
         picked = waiting[len(waiting) // 2]
         (found,) = follow_both_ways(problem, [(picked.state, picked.speed)], OUTWARD, PATIENCE_OUT)
-        waiting = [w for w in waiting if w is not picked and not (found and _covers(found, w.speed, w.state, scale))]
+        waiting = [w for w in waiting if w is not picked and not (found and _covers(found, w.speed, w.state, apart))]
         parts += _stable_parts(found, 0, (limits[0] * 30 / np.pi, limits[1] * 30 / np.pi)) if found else []
     low, high = (end * 30 / np.pi for end in operating)
     overlap = lambda part: min(part.upper_rpm, high) - max(part.lower_rpm, low)
-    best = max(_merged(parts, scale), key=overlap, default=None)
+    best = max(_merged(parts, apart), key=overlap, default=None)
     if best is None or overlap(best) < 0:
         return None
     rise = np.argsort(best.speeds)

@@ -10,7 +10,7 @@ As for chaotic zones, stretches narrower than a stated width do not count and wi
 only between stretches wider than the window: a row of very narrow ones would move an edge far from the stretch it
 belongs to, to a bifurcation whose position depends on the solver.
 
-Edges of chaotic zones, which are statistical, are compared with bifurcations and limits of cascades.
+Edges of chaotic zones, which are statistical, are compared with bifurcations.
 """
 
 import dataclasses
@@ -20,17 +20,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..analysis import Zone, Zones, closing_width
-from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
-from ..solve import AbstractMethod
-from .branch import Cascade, cascade
 from .point import Point
 from .search import StableRange, SynchronousOrbits
-
-
-CASCADE_REACH_RPM = 500.0
-"""Distance on the stable side of a chaotic edge within which period doublings may begin a cascade that ends there."""
-CASCADE_LEVELS = 4
 
 
 @dataclasses.dataclass(frozen=True)
@@ -136,56 +128,34 @@ def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) 
     return float(np.mean(found.sweep.label[inside] != "periodic-1")) if np.any(inside) else float("nan")
 
 
-@dataclasses.dataclass(frozen=True)
-class Explained:
-    """Chaotic zones with the mechanisms of their edges, and the bifurcations or cascades that explain them by edge,
+class Explained(NamedTuple):
+    """Chaotic zones with the mechanisms of their edges, and the bifurcations that coincide with an edge, by its name,
     e.g. `zone 1 exit`; other edges remain statistical."""
 
     zones: Zones
-    sources: dict[str, Point | Cascade]
+    sources: dict[str, Point]
 
 
-def explain(
-    zones: Zones, found: SynchronousOrbits, system: AbstractForcedSystem, method: AbstractMethod | None = None
-) -> Explained:
-    """Assign mechanisms to the chaotic edges that coincide with a bifurcation or the limit of a cascade.
+def explain(zones: Zones, found: SynchronousOrbits) -> Explained:
+    """Assign mechanisms to the chaotic edges that coincide with an end of a stable stretch: an onset with an upper end,
+    an exit with a lower end.
 
     The tolerance is the smaller of the edge's uncertainty and the sweep's resolution: a wider error bar, from mean
-    lives near the horizon or failed trajectories, would coincide with anything. An onset may be the upper end of a
-    stable orbit; an exit, the lower end. Bifurcations are tried first, then the limits of cascades that begin at period
-    doublings on the stable side.
+    lives near the horizon or failed trajectories, would coincide with anything.
     """
-    sources: dict[str, Point | Cascade] = {}
+    sources: dict[str, Point] = {}
     changed: list[Zone] = []
     for number, zone in enumerate(zones.zones, start=1):
-        ends = {}
-        for end, edge, calm in (("onset", zone.onset, -1), ("exit", zone.exit, 1)):
-            if edge is not None:
-                near = min(edge.uncertainty_rpm, zones.resolution_rpm)
-                points = [p for x in found.stretches if (p := x.upper if calm < 0 else x.lower) is not None]
-                source = _source(points, edge.speed_rpm, near, calm, system, method)
-                if source is not None:
-                    sources[f"zone {number} {end}"], edge = source, source.as_edge(edge.kind)
-            ends[end] = edge
+        ends = {"onset": zone.onset, "exit": zone.exit}
+        for end, edge in ends.items():
+            if edge is None:
+                continue
+            near = min(edge.uncertainty_rpm, zones.resolution_rpm)
+            away = lambda p: abs(p.speed_rpm - edge.speed_rpm)
+            points = [p for s in found.stretches if (p := s.upper if end == "onset" else s.lower) is not None]
+            here = [p for p in points if away(p) <= near + np.nan_to_num(p.error_rpm)]
+            if here:
+                sources[f"zone {number} {end}"] = source = min(here, key=away)
+                ends[end] = source.as_edge(edge.kind)
         changed.append(dataclasses.replace(zone, **ends))
     return Explained(dataclasses.replace(zones, zones=tuple(changed)), sources)
-
-
-def _source(
-    points: list[Point], rpm: float, near: float, calm: int, system: AbstractForcedSystem, method: AbstractMethod | None
-) -> Point | Cascade | None:
-    """Return the point within `near` of an edge at `rpm`, or the cascade whose limit is; `calm` is 1 if the stable side
-    is above the edge, -1 if below."""
-    away = lambda p: abs(p.speed_rpm - rpm)
-    here = [p for p in points if away(p) <= near + np.nan_to_num(p.error_rpm)]
-    if here:
-        return min(here, key=away)
-    beyond = lambda p: 0 < calm * (p.speed_rpm - rpm) <= CASCADE_REACH_RPM
-    doublings = [p for p in points if p.kind == "period-doubling" and beyond(p)]
-    reach = 2 * CASCADE_REACH_RPM * np.pi / 30
-    for point in sorted(doublings, key=away):
-        speed = float(point.speed)
-        tried = cascade(system, point, lower=speed - reach, upper=speed + reach, levels=CASCADE_LEVELS, method=method)
-        if np.isfinite(tried.error) and abs(tried.limit * 30 / np.pi - rpm) <= near:
-            return tried
-    return None

@@ -8,7 +8,7 @@ from typing import Any
 from .._parameters import EXTRA, parameter_info, parameters
 from ..design import LastingEdge, MeanGradient, SolvedEdge, ZoneWidth, zone_width
 from ..models import AbstractForcedSystem
-from ..orbits import Cascade, Explained, Sensitivity, UnstableRanges, limit_sensitivity, sensitivities, sensitivity
+from ..orbits import Explained, Sensitivity, UnstableRanges, sensitivities
 from ..solve import AbstractMethod
 from .tables import Beside, Column, Table, chosen, number, speed_columns, table
 
@@ -37,12 +37,9 @@ def to_be_turned(model: AbstractForcedSystem, slopes: Iterable[Sensitivity]) -> 
 def edge_slopes(
     model: Any, loss: UnstableRanges, explained: Explained, method: AbstractMethod | None
 ) -> dict[str, Sensitivity]:
-    """Sensitivities of the edges of unstable ranges, and of chaotic edges that coincide with something exact."""
-    slopes = sensitivities(model, loss.edges, method)
-    for name, source in explained.sources.items():
-        of: Any = limit_sensitivity if isinstance(source, Cascade) else sensitivity
-        slopes[f"chaotic {name}"] = of(model, source, f"chaotic {name}", method)
-    return slopes
+    """Sensitivities of the edges of unstable ranges, and of chaotic edges that coincide with a bifurcation."""
+    chaotic = {f"chaotic {name}": point for name, point in explained.sources.items()}
+    return sensitivities(model, loss.edges | chaotic, method)
 
 
 def elasticities_table(name: str, slopes: Mapping[str, Sensitivity], beside: Beside = None) -> Table:
@@ -81,16 +78,12 @@ def gradient_table(name: str, model: AbstractForcedSystem, slope: Sensitivity) -
 
 
 def source_notes(explained: Explained) -> list[str]:
-    """Notes on the edges of chaotic zones that coincide with a bifurcation or the limit of a cascade."""
+    """Notes on the edges of chaotic zones that coincide with a bifurcation."""
     edges = [e for zone in explained.zones.zones for e in (zone.onset, zone.exit) if e is not None]
     statistical = sum(e.basis == "statistical" for e in edges)
     notes = [f"Chaotic edges that stay statistical: {statistical} of {len(edges)}"] if edges else []
     for name, source in explained.sources.items():
-        if isinstance(source, Cascade):
-            doublings = ", ".join(f"{float(p.speed_rpm):.1f}" for p in source.points)
-            notes.append(f"Chaotic {name}: limit of the cascade with period doublings at {doublings} rpm")
-        else:
-            notes.append(f"Chaotic {name}: coincides with the {source.kind} at {float(source.speed_rpm):.2f} rpm")
+        notes.append(f"Chaotic {name}: coincides with the {source.kind} at {float(source.speed_rpm):.2f} rpm")
     return notes
 
 
