@@ -123,7 +123,7 @@ class OrbitProblem(eqx.Module):
     @property
     def turns(self) -> Float[Array, " dim"]:
         """Revolutions of the components that are angles (see `turns_of`), in units of the state."""
-        return turns_of(self.angles, self.dimension) / self.scale
+        return jnp.asarray(turns_of(self.angles, self.dimension)) / self.scale
 
     def moved(self, u: Float[Array, " n"], image: Float[Array, " dim"]) -> Float[Array, " dim"]:
         """Return the motion from the unknowns u to the image of the map, without whole revolutions of the angles."""
@@ -174,8 +174,8 @@ def make_problem(
 ) -> OrbitProblem:
     """Return the problem in units of the system's scale at the given speed."""
     scale = jnp.stack([jnp.asarray(c, dtype=float) for c in given.system.scale(given.speed)])
-    numbers = frozen((scale, jnp.asarray(units, dtype=float), jnp.asarray(periods, dtype=int)))
-    return OrbitProblem(method, parameters, *numbers, given.system.angles)
+    scale, units, periods = frozen((scale, jnp.asarray(units, dtype=float), jnp.asarray(periods, dtype=int)))
+    return OrbitProblem(method, parameters, scale, units, periods, given.system.angles)
 
 
 # --- steps per revolution -------------------------------------------------------------------------------------------

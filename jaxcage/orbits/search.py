@@ -177,7 +177,7 @@ def _distinct(points: Sequence[Point], angles: Sequence[int]) -> tuple[Point, ..
     for p in sorted((p for p in points if p.status == "converged"), key=lambda p: p.value):
         apart = lambda q: max(1e-6 * p.value, float(np.nan_to_num(p.error + q.error)))
         near = [q for q in kept[-6:] if q.kind == p.kind and abs(q.value - p.value) < apart(q)]
-        if not any(_same(q.state, p.state, angles, 1e-3) for q in near):
+        if not any(_same(np.asarray(q.state), np.asarray(p.state), angles, 1e-3) for q in near):
             kept.append(p)
     return tuple(kept)
 

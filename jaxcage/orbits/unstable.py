@@ -151,7 +151,7 @@ def explain(zones: Zones, found: SynchronousOrbits) -> Explained:
             if edge is None:
                 continue
             near = min(edge.uncertainty_rpm, zones.resolution_rpm)
-            away = lambda p: abs(p.speed_rpm - edge.speed_rpm)
+            away = lambda p, rpm=edge.speed_rpm: abs(p.speed_rpm - rpm)
             points = [p for s in found.stretches if (p := s.upper if end == "onset" else s.lower) is not None]
             here = [p for p in points if away(p) <= near + np.nan_to_num(p.error_rpm)]
             if here:
