@@ -109,7 +109,7 @@ plt.show()
 # the period doubling must therefore be proportional to c to the power -1/2.
 
 # %%
-cubics = np.linspace(0.8, 1.2, 5)
+cubics = np.linspace(0.9, 1.1, 5)
 forces_at = [float(doubling(oscillator(0.26, cubic)).value) for cubic in cubics]
 figure, ax = plt.subplots(figsize=(7, 4), layout="constrained")
 ax.plot(cubics, forces_at, "o", label="solved for")
