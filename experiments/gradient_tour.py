@@ -30,8 +30,8 @@ import numpy as np
 from jaxcage.show import elasticity_bars
 
 
-jc.enable_x64()
 jc.keep_compiled_programs()
+jc.enable_x64()
 model = jc.case("1a")
 gap = float(jc.parameters(model)["guidance_gap"])
 
@@ -78,9 +78,9 @@ plt.show()
 
 # %% [markdown]
 # ## Through a simulation
-# The mean of x² over n revolutions can be differentiated as well, revolution by revolution. The derivative
-# settles on the stable orbit at 16 000 rpm. In chaos at 11 000 rpm it grows like $e^{\lambda n}$, with the largest
-# exponent $\lambda$ of the motion, and says nothing about the mean.
+# The mean of x² over n revolutions can be differentiated as well, revolution by revolution. The derivative settles on
+# the stable orbit at 16 000 rpm. In chaos at 11 000 rpm it grows like $e^{\lambda n}$, with the largest exponent
+# $\lambda$ of the motion, and says nothing about the mean.
 
 
 # %%
@@ -103,8 +103,16 @@ exponent, error = (float(swept[name].values[0, 0, 0]) for name in ("exponents", 
 print(f"the derivative grows by e^{rate:.2f} in a revolution; largest exponent {exponent:.2f} ± {2 * error:.2f}")
 
 figure, ax = plt.subplots(figsize=(7, 4), layout="constrained")
-ax.semilogy(n, np.abs(chaotic), label="chaos, 11 000 rpm")
-ax.semilogy(n, np.abs(stable), label="stable orbit, 16 000 rpm")
+ax.semilogy(n[1:], np.abs(chaotic[1:]), label="chaos, 11 000 rpm")
+ax.semilogy(n[1:], np.abs(stable[1:]), label="stable orbit, 16 000 rpm")
 ax.set(xlabel="Revolutions n", ylabel="|d mean x² / d gap| [m]")
 ax.legend(frameon=False)
 plt.show()
+
+# %% [markdown]
+# ## Conclusion
+# The edge is at 12 355.5353 ± 0.0002 rpm, and 1 % more gap lowers it by 0.2783405 %; finite differences of edges that
+# are solved for anew agree in all these digits. With 10 % less gap the straight line is 1 % off. Through chaos the
+# derivative of a simulation grows by a factor of e^0.44 in every revolution, as the exponent of 0.44 ± 0.05 says, to
+# 1e32 m after 200 revolutions. So differentiate orbits and edges, which solve equations, and never a chaotic
+# simulation.

@@ -27,8 +27,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 
-jc.enable_x64()
 jc.keep_compiled_programs()
+jc.enable_x64()
 model = jc.case("1a")
 operating = tuple(jc.rpm(12500, 18000, 2))
 vary = {"guidance_gap": (0.35e-3, 0.65e-3), "eccentricity": (8e-6, 30e-6)}

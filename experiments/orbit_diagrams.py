@@ -28,8 +28,8 @@ from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.show import exponent_strip, mark_published, orbit_diagram
 
 
-jc.enable_x64()
 jc.keep_compiled_programs()
+jc.enable_x64()
 names = ("1a", "1b")
 swept = jc.sweep(
     [jc.case(name) for name in names], jc.rpm(6000, 14000, SPEEDS), discard=DISCARD, revolutions=REVOLUTIONS

@@ -29,8 +29,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 
-jc.enable_x64()
 jc.keep_compiled_programs()
+jc.enable_x64()
 
 
 # %%
@@ -77,7 +77,8 @@ print(f"elasticity with respect to the cubic term {elasticity:.8f}")
 cascade = jc.orbits.cascade(oscillator(0.26), first, "force", lower=0.2, upper=0.3, levels=DOUBLINGS, method=method)
 print(cascade)
 values = np.array(cascade.values)
-ratios = np.diff(values)[:-1] / np.diff(values)[1:]
+distances = np.diff(values)
+print("ratios of the distances:", *(distances[:-1] / distances[1:]).round(3))
 
 # %% [markdown]
 # ## The sweep
@@ -113,8 +114,15 @@ cubics = np.linspace(0.9, 1.1, 5)
 forces_at = [float(doubling(oscillator(0.26, cubic)).value) for cubic in cubics]
 figure, ax = plt.subplots(figsize=(7, 4), layout="constrained")
 ax.plot(cubics, forces_at, "o", label="solved for")
-ax.plot(cubics, values[0] / np.sqrt(cubics), "-", label="scaling law")
-ax.plot(cubics, values[0] * (1 + elasticity * (cubics - 1)), "--", label="derivative at c = 1")
+c = np.linspace(0.9, 1.1, 50)
+ax.plot(c, values[0] / np.sqrt(c), "-", label="scaling law")
+ax.plot(c, values[0] * (1 + elasticity * (c - 1)), "--", label="derivative at c = 1")
 ax.set(xlabel="Cubic term c [1]", ylabel="Force at the period doubling [1]")
 ax.legend(frameon=False)
 plt.show()
+
+# %% [markdown]
+# ## Conclusion
+# Chaos begins at a force of 0.292288 ± 0.000001, where the cascade ends; in the sweep the exponent passes zero there.
+# The first period doubling is at 0.2655818 ± 0.0000003, and its elasticity with respect to the cubic term is -1/2 to
+# eight digits, as the scaling law demands.

@@ -16,7 +16,7 @@ SMALL = {
     "optimise_gap_and_balance": "GAPS, STATES = 3, 3",
     "orbit_diagrams": "SPEEDS, DISCARD, REVOLUTIONS = 12, 30, 20",
     "sensitivity_and_tolerances": "BEARINGS, SPEEDS, SAMPLES = 3, 4, 2",
-    "your_own_bearing": "SPEEDS, DRAWS = 12, 4",
+    "your_own_bearing": "SPEEDS, DRAWS, AT = 12, 4, 5",
     "your_own_oscillator": "FORCES, DISCARD, REVOLUTIONS, DOUBLINGS = 48, 50, 40, 3",
 }
 """Sizes of the tests, which take the place of those in the cell of parameters."""
