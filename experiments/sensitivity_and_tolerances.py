@@ -99,3 +99,10 @@ right.barh([name.replace("_", " ") for name in order], [budget.deviation[name] f
 right.set(xlabel="Standard deviation of the edge [rpm]", title=f"Edge at {exact.value_rpm:.0f} rpm, ±5 %")
 figure.savefig("sensitivity_and_tolerances.png")
 plt.show()
+
+# %% [markdown]
+# ## Conclusion
+# The cage mass makes 70 % of the edge's variance and the amplitude of the impacts 30 %; guidance gap, eccentricity and
+# land width make less than 1 %, so that narrower tolerances of these would buy nothing for this edge. In 40 bearings
+# the edges solved for have a standard deviation of 481 ± 54 rpm, to first order 483. How much of the whole speed range
+# is chaotic is another question: there the gap counts most (0.60, 95 % interval 0.46 to 0.77).

@@ -51,6 +51,7 @@ def test_experiment(name: str, tmp_path: pathlib.Path):
 def test_notebook_has_the_code_of_its_script_and_shows_its_figures(name: str):
     cells, text = code_cells(name), (EXPERIMENTS / f"{name}.py").read_text()
     assert cells and all("".join(cell["source"]).strip() in text for cell in cells)
+    assert not [output for cell in cells for output in cell["outputs"] if output["output_type"] == "error"]
     pictures = [
         output["data"]["image/png"]
         for cell in cells
