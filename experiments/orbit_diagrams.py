@@ -74,7 +74,7 @@ for name, sweep in sweeps.items():
 
 # %% [markdown]
 # ## Conclusion
-# The main zone lies between 9450 ± 450 and 12 150 ± 150 rpm with a gap of 0.45 mm, and between 9150 ± 350 and 11 850 ±
-# 250 rpm with 0.60 mm. Both edges are 300 rpm lower, which is less than their errors together, and the zone is 2700
-# rpm wide in both cases: the wider gap does not narrow it. It also lets chaos that dies out reach further up, from 12
-# 500 to 14 000 rpm.
+# The main zone lies between 9450 ± 450 and 12 150 ± 150 rpm with a gap of 0.45 mm, and between 9150 ± 350 and
+# 11 850 ± 250 rpm with 0.60 mm. Both edges are 300 rpm lower, which is less than their errors together, and the zone
+# is 2700 rpm wide in both cases: the wider gap does not narrow it. It also lets chaos that dies out reach further up,
+# from 12 500 to 14 000 rpm.
