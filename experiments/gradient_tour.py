@@ -53,7 +53,6 @@ print(f"{exact.kind} at {exact.value_rpm:.4f} ± {exact.error_rpm:.1g} rpm of th
 # %%
 figure, ax = plt.subplots(figsize=(9, 4.5), layout="constrained")
 elasticity_bars([exact], ax)
-figure.savefig("gradient_tour.png")
 plt.show()
 
 # %% [markdown]

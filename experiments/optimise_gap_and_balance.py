@@ -59,7 +59,7 @@ for name, colour in (("lower", "#0072B2"), ("upper", "#D55E00")):
         gaps, speed, reach, reach * slope, angles="xy", scale_units="xy", scale=1, color=colour, width=0.004, zorder=3
     )
 ax.axvline(0.45, color="0.4", linewidth=0.8, linestyle="--", label="gap as given")
-ax.set(xlabel="Guidance gap [mm]", ylabel="Cage speed [rpm]")
+ax.set(xlabel="Guidance gap [mm]", ylabel="Cage speed [rpm]", xlim=(gaps[0] - 0.01, gaps[-1] + 0.02))
 ax.legend(fontsize=8, loc="upper left")
 plt.show()
 
