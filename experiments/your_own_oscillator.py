@@ -15,7 +15,6 @@
 
 # %% tags=["parameters"]
 FORCES, DISCARD, REVOLUTIONS = 400, 300, 200  # of the sweep
-DOUBLINGS = 5  # of the cascade
 
 # %%
 import jaxcage as jc  # before JAX, so that compiled programs are kept without remarks of XLA
@@ -70,15 +69,23 @@ print(f"elasticity with respect to the cubic term {elasticity:.8f}")
 
 # %% [markdown]
 # ## The cascade
-# Each doubled orbit doubles again. The distances shrink by Feigenbaum's ratio of 4.669, and where they add up chaos
-# begins.
+# The doubled orbit doubles again, and so on. The distances shrink by Feigenbaum's ratio, 4.6692; where they add up to,
+# chaos begins. The last two sums tell the error.
 
 # %%
-cascade = jc.orbits.cascade(oscillator(0.26), first, "force", lower=0.2, upper=0.3, levels=DOUBLINGS, method=method)
-print(cascade)
-values = np.array(cascade.values)
+values = [float(first.value)]
+for periods, force in ((2, 0.284), (4, 0.2905), (8, 0.2918)):
+    near = jc.periodic_orbit(
+        oscillator(force), SPEED, guess=(1.0, 0.0), periods=periods, revolutions=400, method=method
+    )
+    values.append(
+        float(jc.bifurcation(oscillator(force), "period-doubling", near, "force", speed=SPEED, method=method).value)
+    )
 distances = np.diff(values)
+sums = values[1:] + distances / (4.6692 - 1)
+print("the period doubles at", *np.round(values, 7))
 print("ratios of the distances:", *(distances[:-1] / distances[1:]).round(3))
+print(f"chaos begins at a force of {sums[-1]:.7f} ± {abs(sums[-1] - sums[-2]):.0g}")
 
 # %% [markdown]
 # ## The sweep
@@ -98,7 +105,7 @@ below.plot(forces, exponent, color="#0072B2", linewidth=0.9)
 below.axhline(0, color="black", linewidth=0.6)
 for ax in (above, below):
     ax.axvline(values[0], color="#D55E00", linewidth=0.8, label="first period doubling")
-    ax.axvline(cascade.limit, color="#009E73", linewidth=0.8, label="end of the cascade")
+    ax.axvline(sums[-1], color="#009E73", linewidth=0.8, label="end of the cascade")
 above.set_ylabel("Position x [1]")
 above.legend(loc="lower right", fontsize=8)
 below.set(xlabel="Force [1]", ylabel="Largest exponent\nper revolution")
