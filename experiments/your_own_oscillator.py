@@ -130,6 +130,6 @@ plt.show()
 
 # %% [markdown]
 # ## Conclusion
-# Chaos begins at a force of 0.292288 ± 0.000001, where the cascade ends; in the sweep the exponent passes zero there.
-# The first period doubling is at 0.2655818 ± 0.0000003, and its elasticity with respect to the cubic term is -1/2 to
-# eight digits, as the scaling law demands.
+# Chaos begins at a force of 0.2922875 ± 0.0000007, where the cascade ends; in the sweep the exponent passes zero
+# there. The first period doubling is at 0.2655818 ± 0.0000003, and its elasticity with respect to the cubic term is
+# -1/2 to eight digits, as the scaling law demands.
