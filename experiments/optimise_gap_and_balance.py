@@ -74,7 +74,7 @@ best = jc.design_for(model, operating, vary, tolerance=tolerance, check=STATES)
 path = np.array([(1e3 * step["guidance_gap"], 1e6 * step["eccentricity"]) for step in best.path])
 chosen = 1e3 * best.values["guidance_gap"], 1e6 * best.values["eccentricity"]
 figure, ax = plt.subplots(figsize=(8, 4.5), layout="constrained")
-x, y = np.meshgrid(np.linspace(0.43, 0.65, 50), np.linspace(14, 30, 50))
+x, y = np.meshgrid(np.linspace(0.43, 0.67, 50), np.linspace(14, 31, 50))
 lines = ax.contour(x, y, 0.45 / x + 23 / y, levels=np.arange(1.4, 2.8, 0.1), colors="0.75", linewidths=0.8)
 ax.clabel(lines, fontsize=7)
 ax.plot(*path.T, "o-", color="#0072B2", markersize=5, label=f"designs on the way ({best.evaluations} solved for)")
@@ -124,4 +124,5 @@ plt.show()
 
 # %%
 print(best)
+print("At a bound of the search:", ", ".join(best.at_bound) or "nothing")
 print("Checked:", best.checked)
