@@ -8,64 +8,110 @@
 #     name: python3
 # ---
 # %% [markdown]
-# # A tour of gradients
-# 1. An edge of a zone is a bifurcation of the synchronous orbit: it has equations, and so an exact gradient.
-# 2. The largest Floquet multiplier has one too, on either side of the edge.
-# 3. A chaotic trajectory has none that is worth having: its derivative explodes.
+# # Which derivatives of a cage's motion can be trusted?
+# How far does an edge of the calm range move if the guidance gap is made 1 % larger? This page answers by the
+# derivative of an equation, checks it against edges that are solved for anew, and shows why the derivative of a
+# simulation fails where the motion is chaotic. The cage is that of case 1a of the paper.
+
+# %% tags=["parameters"]
+REVOLUTIONS = 200  # along which the derivative of a simulation is followed
+GAPS = 9  # at which the edge is solved for
 
 # %%
-import jaxcage as jc  # before jax: it keeps XLA from talking of kept programs
+import jaxcage as jc  # before JAX, so that compiled programs are kept without remarks of XLA
 
 
 # isort: split
 import jax
 import jax.numpy as jnp
-from _size import save, small
+import matplotlib.pyplot as plt
+import numpy as np
 
-from jaxcage.show import elasticity_bars, new_figure
+from jaxcage.show import elasticity_bars
 
 
+jc.keep_compiled_programs()
 jc.enable_x64()
 model = jc.case("1a")
+gap = float(jc.parameters(model)["guidance_gap"])
 
 # %% [markdown]
-# The synchronous orbits around 12500 rpm, found without a hint, and the bifurcation at which the calm stretch begins.
+# ## The edge
+# Below the calm range the synchronous orbit loses its stability. The search needs no hint but a range of speed. It
+# finds where the multiplier of the orbit passes -1: the period doubles there.
 
 # %%
 orbits = jc.synchronous_orbits(model, jc.rpm(12000), jc.rpm(13000), count=21, discard=1500)
-print(orbits)
-edge = next(p for p in orbits.edges if p.kind == "period-doubling")
-
-# %%
-exact = jc.sensitivity(model, edge, f"lower edge of the calm stretch ({edge.kind})")
-print(exact)
-print("homogeneity", {k: f"{v:.1e}" for k, v in exact.homogeneity.items()})
+edge = next(point for point in orbits.edges if point.kind == "period-doubling")
+exact = jc.sensitivity(model, edge, "lower edge of the calm range")
+print(f"{exact.kind} at {exact.value_rpm:.4f} ± {exact.error_rpm:.1g} rpm of the cage")
 
 # %% [markdown]
-# The same number from two edges that are solved anew, with a gap that is a little smaller and a little larger:
+# The edge solves an equation, so that its derivative costs one linear solve, for all parameters at once. An elasticity
+# of -0.9 says that 1 % more of the parameter lowers the edge by 0.9 %.
 
 # %%
-step = 1e-6
-around = [jc.sensitivity(jc.replace(model, guidance_gap=0.45e-3 * (1 + s * step)), edge) for s in (1, -1)]
-difference = (around[0].value_rpm - around[1].value_rpm) / (2 * step * exact.value_rpm)
-print(f"elasticity by the gap: {exact.elasticity['guidance_gap']:+.7f}, by differences {difference:+.7f}")
-
-# %%
-figure = new_figure(9.0, 4.5)
-elasticity_bars([exact], figure.subplots())
-save(figure, "gradient_tour")
+figure, ax = plt.subplots(figsize=(9, 4.5), layout="constrained")
+elasticity_bars([exact], ax)
+plt.show()
 
 # %% [markdown]
-# Through chaos: the derivative of a mean over n revolutions by the gap grows like e^(lambda n).
+# ## The check
+# The edge is solved for anew at other gaps. The derivative is the slope of the curve through these edges.
 
 # %%
-chaotic = float(jc.rpm(11000.0))
-for n in (10, 40, 80)[: small(3, 2)]:
+gaps = gap * np.linspace(0.9, 1.1, GAPS)
+solved = [jc.sensitivity(jc.replace(model, guidance_gap=g), edge).value_rpm for g in gaps]
+small = 1e-6
+above, below = (jc.sensitivity(jc.replace(model, guidance_gap=gap * (1 + s * small)), edge) for s in (1, -1))
+difference = (above.value_rpm - below.value_rpm) / (2 * small * exact.value_rpm)
+elasticity = exact.elasticity["guidance_gap"]
+print(f"elasticity with respect to the gap: {elasticity:.7f}, by finite differences {difference:.7f}")
 
-    def mean_square(gap, n=n):
-        strobe = jc.strobe_map(jc.replace(model, guidance_gap=gap), chaotic)
-        start = tuple(jnp.asarray(c, dtype=float) for c in model.initial_states(chaotic)[0])
-        advance = lambda y, _: (strobe(y).y, y[0] ** 2)
-        return jnp.mean(jax.lax.scan(advance, start, None, n)[1])
+figure, ax = plt.subplots(figsize=(7, 4), layout="constrained")
+ax.plot(1e3 * gaps, solved, "o", label="edge solved for at this gap")
+ax.plot(1e3 * gaps, exact.value_rpm * (1 + elasticity * (gaps / gap - 1)), "-", label="derivative at 0.45 mm")
+ax.set(xlabel="Guidance gap [mm]", ylabel="Lower edge of the calm range [rpm]")
+ax.legend(frameon=False)
+plt.show()
 
-    print(f"{n} revolutions: {float(jax.jit(jax.jacfwd(mean_square))(0.45e-3)):+.3e}")
+# %% [markdown]
+# ## Through a simulation
+# The mean of x² over n revolutions can be differentiated as well, revolution by revolution. The derivative settles on
+# the stable orbit at 16 000 rpm. In chaos at 11 000 rpm it grows like $e^{\lambda n}$, with the largest exponent
+# $\lambda$ of the motion, and says nothing about the mean.
+
+
+# %%
+def mean_squares(gap, speed):
+    """Mean of x² [m²] over the first n revolutions, for n = 1, 2, ..."""
+    system = jc.replace(model, guidance_gap=gap)
+    strobe = jc.strobe_map(system, speed)
+    start = tuple(jnp.asarray(c, dtype=float) for c in model.initial_states(speed)[0])
+    _, squares = jax.lax.scan(lambda y, _: (strobe(y).y, y[0] ** 2), start, None, REVOLUTIONS)
+    return jnp.cumsum(squares) / jnp.arange(1, REVOLUTIONS + 1)
+
+
+slope = lambda rpm: jax.jit(jax.jacfwd(lambda g: mean_squares(g, float(jc.rpm(rpm)))))(gap)
+chaotic, stable = slope(11000.0), slope(16000.0)
+n = np.arange(1, REVOLUTIONS + 1)
+growing = slice(REVOLUTIONS // 4, None)
+rate = np.polyfit(n[growing], np.log(np.abs(chaotic[growing])), 1)[0]
+swept = jc.sweep(model, jc.rpm(11000.0), revolutions=2 * REVOLUTIONS)
+exponent, error = (float(swept[name].values[0, 0, 0]) for name in ("exponents", "standard_error"))
+print(f"the derivative grows by e^{rate:.2f} in a revolution; largest exponent {exponent:.2f} ± {2 * error:.2f}")
+
+figure, ax = plt.subplots(figsize=(7, 4), layout="constrained")
+ax.semilogy(n[1:], np.abs(chaotic[1:]), label="chaos, 11 000 rpm")
+ax.semilogy(n[1:], np.abs(stable[1:]), label="stable orbit, 16 000 rpm")
+ax.set(xlabel="Revolutions n", ylabel="|d mean x² / d gap| [m]")
+ax.legend(frameon=False)
+plt.show()
+
+# %% [markdown]
+# ## Conclusion
+# The edge is at 12 355.5353 ± 0.0002 rpm, and 1 % more gap lowers it by 0.2783405 %; finite differences of edges that
+# are solved for anew agree in all these digits. With 10 % less gap the straight line is 1 % off. Through chaos the
+# derivative of a simulation grows by a factor of e^0.44 in every revolution, as the exponent of 0.44 ± 0.05 says, to
+# 1e32 m after 200 revolutions. So differentiate orbits and edges, which solve equations, and never a chaotic
+# simulation.
