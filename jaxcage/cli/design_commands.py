@@ -31,7 +31,7 @@ Vary = Annotated[
 VERDICTS = {
     "calm": "Calm over {range}",
     "stable, not checked": "Stable over {range}, not checked by simulations",
-    "stable, but not from every start": "Stable over {range}, but not from every initial state",
+    "stable, but not from every initial state": "Stable over {range}, but not from every initial state",
 }
 
 

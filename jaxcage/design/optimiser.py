@@ -98,12 +98,12 @@ class Design:
 
     @property
     def verdict(self) -> str:
-        """One of `calm`, `stable, but not from every start`, `stable, not checked` and `not feasible`."""
+        """One of `calm`, `stable, but not from every initial state`, `stable, not checked` and `not feasible`."""
         if not self.feasible:
             return "not feasible"
         if self.checked is None:
             return "stable, not checked"
-        return "calm" if self.checked.calm else "stable, but not from every start"
+        return "calm" if self.checked.calm else "stable, but not from every initial state"
 
     def __str__(self) -> str:
         rows = [f"Design: {self.verdict}, cost {self.cost_before:.4g} -> {self.cost:.4g}"]
