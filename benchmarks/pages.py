@@ -105,7 +105,7 @@ BLOCKS: dict[str, tuple[str, str, Part]] = {
     ),
     "runup-figure": (COMMANDS, "jaxcage runup 1a --first 8000 --last 14000", figure("runup_1a.png")),
     "map-figure": (
-        *(COMMANDS, "jaxcage map 1a --points 60x40 --no-curves"),
+        *(COMMANDS, "jaxcage map 1a --points 60x40 --quick"),
         figure("map_1a_speed_guidance_gap.png", "map_1a.png"),
     ),
     "gradient-figure": (COMMANDS, "jaxcage gradient 1a", figure("gradient_1a.png")),
