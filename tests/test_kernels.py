@@ -134,6 +134,15 @@ def test_kernels_give_the_strobe_map_and_its_derivative(name):
     assert np.all(peak >= 0)
 
 
+def test_reverse_mode_is_refused_in_a_sentence():
+    image = lambda speed: strobe_map(MODEL, speed, method("rk4", steps=16))(tuple(STATES[0])).y[0]
+    with pytest.raises(ValueError, match="A trajectory must be differentiated in forward mode"):
+        jax.grad(image)(SPEEDS[0])
+    with pytest.raises(ValueError, match="A trajectory must be differentiated in forward mode"):
+        jax.jit(jax.grad(image))(SPEEDS[0])
+    assert np.isfinite(jax.jacfwd(image)(SPEEDS[0]))
+
+
 # --- error control ------------------------------------------------------------------------------------------------
 
 

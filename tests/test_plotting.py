@@ -18,7 +18,7 @@ from jaxcage.show import Axis, exponent_strip, multiplier_circle, orbit_diagram,
 from jaxcage.show.design_figures import EDGE_COLOURS
 from jaxcage.show.diagrams import shade_zones
 from jaxcage.show.orbit_figures import MARKS, PERIOD_COLOURS, branch_diagram
-from jaxcage.show.run_figures import START_COLOURS, orbit, time_history
+from jaxcage.show.run_figures import STATE_COLOURS, orbit, time_history
 from jaxcage.show.style import BLACK, FORCE_COLOURS, KIND_COLOURS, OWN_COLOURS, PAPER, ZONE
 
 
@@ -213,7 +213,7 @@ SEEN_BY = {
 MARKED = tuple(mark.colour for mark in MARKS.values())
 CYCLES = [
     *(tuple(colours.values()) for colours in (KIND_COLOURS, FORCE_COLOURS, PERIOD_COLOURS)),
-    *(tuple(colours) for colours in (OWN_COLOURS, MARKED, EDGE_COLOURS, START_COLOURS)),
+    *(tuple(colours) for colours in (OWN_COLOURS, MARKED, EDGE_COLOURS, STATE_COLOURS)),
 ]
 CLEARLY_APART = 12.0
 """Five times the just noticeable CIE 1976 difference of 2.3."""

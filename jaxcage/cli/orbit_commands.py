@@ -303,7 +303,7 @@ def mapped(
     refused: dict[str, str] | None = None,
 ) -> Answer:
     """Answer on a map over speeds [rad/s] and a parameter: simulated points, with edges that are followed on top."""
-    y, title = axis.name, f"{subject.name} over speed and {axis.name}"
+    y, title = axis.name, f"{subject.name} over speed and {axis.words}"
     grid = {"speed": np.linspace(*ends, points[0])}, {y: np.linspace(axis.lower, axis.upper, points[1])}
     found = jc.label_map(subject.model, *grid, **settings, stage=report)
     jc.show.require_some(found)
@@ -312,7 +312,7 @@ def mapped(
     labels, tables = counted(found), []
     document = {"x": "speed", "y": y, "x_range": tuple(x * RPM for x in ends), "y_range": (axis.lower, axis.upper)}
     document |= {"points": points, "labels": labels, "exponents": jc.show.top_exponent(found)}
-    said = f"Over speed and {y} most points are {max(labels, key=labels.__getitem__)}"
+    said = f"Over speed and {axis.words} most points are {max(labels, key=labels.__getitem__)}"
     if curves:
         tables.append(jc.show.curves_table(f"Edges of {title}", curves, axis))
         files["curve_data"] = jc.show.curve_columns(curves, axis)

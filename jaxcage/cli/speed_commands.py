@@ -185,11 +185,9 @@ def poincare(
     each = range(found.sizes["initial_state"])
     rows = [{"initial_state": i + 1} | {name: lanes[name].values[i].item() for name in names} for i in each]
     exponent = jc.show.Column("largest exponent per revolution", "exponents", error="standard_error")
-    title, starts = (
-        f"{subject.name}, {subject.at(at)}",
-        [f"start {row['initial_state']}: {row['label']}" for row in rows],
-    )
-    draw = partial(jc.show.strobe_section, found["strobe"].values[0], names=starts)
+    title = f"{subject.name}, {subject.at(at)}"
+    labels = [f"initial state {row['initial_state']}: {row['label']}" for row in rows]
+    draw = partial(jc.show.strobe_section, found["strobe"].values[0], names=labels)
     files = {"figure": jc.show.drawn(draw, 6.5, 5.4, title), "data": jc.show.strobe_columns(found)}
     title = f"Strobe section of {title}, {jc.analysis.length(found)}"
     tables = [jc.show.table(title, rows, ["initial_state", "label", exponent], "initial_states")]

@@ -93,7 +93,8 @@ def statistic_bars(found: "MeanGradient", title: str = "") -> Figure:
     def bars(ax: Axes, each: Any, colour: str) -> None:
         _bars_with_errors(ax, names, each.elasticity, each.elasticity_error, [colour] * len(names))
         drifts = "" if each.settled else ", not settled"
-        ax.set_title(f"{readable(each.name)}: {each.value:.3g}{drifts}", fontsize=9, loc="left")
+        head = f"{readable(head_of(each.name, each.unit))}: {each.value:.3g}{f' {each.unit}' * (each.unit != '1')}"
+        ax.set_title(f"{head}{drifts}", fontsize=9, loc="left")
         ax.set_xlabel("Elasticity, with two standard errors", fontsize=9)
 
     draw = [partial(bars, each=each, colour=colour) for each, colour in zip(shown, cycle(EDGE_COLOURS), strict=False)]
@@ -179,7 +180,7 @@ def calm_figure(found: "Design", operating: tuple[float, float], title: str = ""
     def costs(ax: Axes) -> None:
         values = [step["cost"] for step in found.path]
         ax.plot(np.arange(1, len(values) + 1), values, "o-", color=BLUE, markersize=3)
-        ax.set(xlabel="Design solved for", ylabel="Cost")
+        ax.set(xlabel="Designs solved for", ylabel="Cost")
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
 
     figure = style.panels([ranges, costs], 2, (11.0, 3.6), title, width_ratios=(1.6, 1.0))

@@ -20,7 +20,7 @@ from . import style
 
 
 Forces = Mapping[str, Float[np.ndarray, "samples 2"]]
-START_COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.SKY)
+STATE_COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.SKY)
 MM = 1e3
 LONGEST_ARROW = 0.14
 """Length of the arrow of the largest pocket force of a run, relative to the outside diameter."""
@@ -129,11 +129,11 @@ def strobe_section(
     x, y = (states[..., i] * named.factor for i, named in zip(along, (place, velocity), strict=True))
     for i, (across, up) in enumerate(zip(x, y, strict=True)):
         # Orbits of several initial states may coincide: the later ones are drawn smaller, on top.
-        look = style.dots(START_COLOURS[i % len(START_COLOURS)], max(7.0 - 2 * i, 2.5) if across.size <= 100 else 2.5)
-        label = names[i] if names else f"start {i + 1}"
+        look = style.dots(STATE_COLOURS[i % len(STATE_COLOURS)], max(7.0 - 2 * i, 2.5) if across.size <= 100 else 2.5)
+        label = names[i] if names else f"initial state {i + 1}"
         ax.plot(across, up, **look, rasterized=across.size > 5000, alpha=0.7, label=label)
     ax.set(xlabel=place.label, ylabel=velocity.label, xlim=_wide_limits(x), ylim=_wide_limits(y))
-    style.legend_above(ax, ncols=len(x))
+    style.legend_above(ax, ncols=min(len(x), 2))
     return ax
 
 

@@ -80,7 +80,7 @@ class Column:
     @property
     def label(self) -> str:
         """Axis label of a figure: the title in words."""
-        words = self.title.replace("_", " ")
+        words = self.title.replace("_", " ").replace(".", " ")
         return words[:1].upper() + words[1:]
 
     @property

@@ -20,9 +20,10 @@ import jax
 import jax.extend as jex
 import jax.numpy as jnp
 from jax.core import Tracer
-from jax.interpreters import ad, batching, mlir
+from jax.interpreters import ad, batching, mlir, partial_eval
 from jaxtyping import Array, Int
 
+from .._errors import InputError
 from .ir import Code, UnknownOperation, Value, number, say_once
 from .program import CONTROL_FLOW, Numbers, Sizes, Step, program_of
 from .xla_call import UnknownInterface, handler_ir, registered
@@ -413,9 +414,18 @@ def _jvp(primals: Sequence[Any], tangents: Sequence[Any], *, how: How) -> Any:
     return [*values, *seen], [*slopes, *none]
 
 
+def _partial(_: Any, *tracers: Any, how: How) -> Any:
+    """Evaluate with known numbers; values and tangents come from one loop, so that reverse mode cannot part them."""
+    if all(x.pval.is_known() for x in tracers):
+        return march_p.bind(*(x.pval.get_known() for x in tracers), how=how)
+    allowed = "must be differentiated in forward mode (`jax.jvp`, `jax.jacfwd`)"
+    raise InputError(f"A trajectory {allowed}, but reverse mode (`jax.grad`, `jax.vjp`, `jax.linearize`) was used.")
+
+
 march_p.def_impl(jax.jit(march_p.bind, static_argnames="how"))
 march_p.def_abstract_eval(_abstract)
 batching.primitive_batchers[march_p] = _batch
 ad.primitive_jvps[march_p] = _jvp
+partial_eval.custom_partial_eval_rules[march_p] = _partial
 mlir.register_lowering(march_p, mlir.lower_fun(_inside_jax, multiple_results=True))
 mlir.register_lowering(march_p, mlir.lower_fun(_on_cpu, multiple_results=True), platform="cpu")
