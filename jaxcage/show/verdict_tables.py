@@ -124,7 +124,7 @@ def indices_table(rows: Sequence[Index]) -> Table:
 def indices_note(rows: Sequence[Index]) -> str:
     """Note on the value to measure first, if the draws show it."""
     if not rows:
-        return "All finished draws agree: they show no unknown value that changes the verdict."
+        return "The finished draws agree, or are too few to tell which unknown value changes the verdict."
     if not rows[0].telling:
         return "The draws do not tell which unknown value to measure first (no index exceeds twice its error)."
     return f"Measure {rows[0].label} first: {rows[0].source}"
