@@ -7,8 +7,9 @@ import pytest
 from helpers import document
 
 import jaxcage as jc
-from jaxcage.design import Ensemble, indices, range_chance
+from jaxcage.design import Checked, Ensemble, indices, range_chance
 from jaxcage.files import Range, Unknown
+from jaxcage.show import forces_note, indices_note, range_sentence
 
 
 def ensemble(chaotic: np.ndarray, failed: np.ndarray | None = None, unknowns: int = 1) -> Ensemble:
@@ -72,3 +73,35 @@ def test_a_bearing_with_its_rollers(capsys: pytest.CaptureFixture[str], tmp_path
     found = document(capsys, "check", "nu2310", "--operating", "10000-14000 rpm shaft", "--out", str(tmp_path))
     assert found["verdict"] in ("calm", "circling", "rattles", "rattles in part")
     assert [row["rpm"] for row in found["speeds"]] == pytest.approx(np.linspace(10000, 14000, 9))
+
+
+def test_failures_are_no_knowledge():
+    """No force is the largest where a simulation failed, and draws that all failed say nothing about the ranges."""
+    note = forces_note({"900 rpm": {"film": 2.0, "weight": 1.0}, "990 rpm": {"film": np.nan, "weight": 1.0}}, ())
+    assert note == "The largest force on the cage at 990 rpm is not known: the simulation there failed"
+    found = ensemble(np.zeros((64, 2), bool), np.ones((64, 2), bool))
+    chance, *outcomes = range_chance(found, 900, 2100)
+    assert chance.known == 0 and indices_note(indices(found, *outcomes)).startswith("The finished draws agree, or are")
+    few = ensemble(np.array([[True, True], [False, False], [False, False]]))
+    assert indices(few, *range_chance(few, 900, 2100)[1:]) == []
+
+
+@pytest.mark.parametrize(
+    "shares, chaotic, begins, ends",
+    [
+        ({"failed": 1.0}, 0, "Not decided", "100.0 % failed."),
+        (
+            {"periodic-1": 0.75, "failed": 0.25},
+            0,
+            "Not decided",
+            "75.0 % of the simulations end calm, and 25.0 % failed.",
+        ),
+        ({"quasi-periodic": 1.0}, 0, "Not calm", "0.0 % end calm, the others on other motions."),
+        ({"chaotic": 0.5, "failed": 0.5}, 2, "The cage rattles", "on a calm motion, and 50.0 % failed."),
+        ({"chaotic": 0.5, "periodic-1": 0.5}, 1, "Not calm", "50.0 % end calm, and chaos is seen at some speeds."),
+    ],
+)
+def test_only_chaos_rattles(shares: dict[str, float], chaotic: int, begins: str, ends: str):
+    speeds = np.array([900.0, 990.0])
+    said = range_sentence("A", None, Checked(speeds, 2, shares, 0, speeds[:chaotic], speeds[:chaotic], "tsit5"))
+    assert said.startswith(begins) and said.endswith(ends)

@@ -205,6 +205,7 @@ def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_pat
     assert (whole["lanes"], whole["stored"], whole["stored_before"]) == (24, 24, 0)
     assert document(capsys, *asked)["stored_before"] == 24
     assert "differs in discard" in refused(capsys, *asked, "--discard", "20")
+    assert "but 2/2 has none" in refused(capsys, *asked, "--shard", "2/2", "--out", str(tmp_path / "other"))
     stored = jc.open_study(whole["store"])
     model, speeds = jc.replace(jc.case("1a"), guidance_gap=0.5e-3), jc.rpm(9000, 12000, 6)
     length = dict(discard=10, revolutions=20, blocks=20, keep=16, method=jc.method("rk4", steps=128))

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 import jaxcage as jc
+from jaxcage.cli import main
 from jaxcage.cli.progress import progress, report
 
 
@@ -63,38 +64,61 @@ def interrupt(stage, done, total):
         os.kill(os.getpid(), signal.SIGINT)
 
 run.cores = lambda: 1
+sys.modules["jaxcage.lanes.study"].LANES = 8
 if sys.argv.pop(1) == "interrupted":
     progress._timed = lambda text, bar: interrupt
 sys.exit(main())
 """
 
 
+def ran(out: Path, how: str, command: str) -> tuple[int, Any, str]:
+    line = [sys.executable, "-c", INTERRUPTED, how, *command.split(), "--json", "--out", str(out)]
+    done = subprocess.run(line, capture_output=True, text=True)
+    return done.returncode, json.loads(done.stdout), done.stderr
+
+
 @pytest.mark.parametrize(
     "command",
     [
         "sweep 1a --count 9 --no-confirm --horizon 0",
-        pytest.param("study 1a --vary speed=9000:12000:16 --chunk 8", marks=pytest.mark.wide),
+        pytest.param("study 1a --vary speed=9000:12000:16", marks=pytest.mark.wide),
         pytest.param("check 1a --operating 9000-9500", marks=pytest.mark.wide),
         pytest.param(f"sweep nu2310 --count 6 {SHORT}", marks=pytest.mark.wide),
     ],
 )
 def test_an_interrupted_command_answers_from_what_is_finished(tmp_path: Path, command: str):
-    def run(how: str) -> tuple[int, Any, str]:
-        line = [sys.executable, "-c", INTERRUPTED, how, *command.split(), "--json", "--out", str(tmp_path)]
-        done = subprocess.run(line, capture_output=True, text=True)
-        return done.returncode, json.loads(done.stdout), done.stderr
-
-    status, found, err = run("interrupted")
+    status, found, err = ran(tmp_path, "interrupted", command)
     assert status == 130 and found["partial"] is True
     assert "Interrupted: the answer from what is finished follows" in err and err.count("Interrupted") == 2
     kept = list(tmp_path.glob("*_unfinished_*.zarr"))
     assert len(kept) == ("nu2310" in command)
-    status, whole, err = run("not")
+    status, whole, err = ran(tmp_path, "not", command)
     assert status == 0 and "partial" not in whole and not list(tmp_path.glob("*_unfinished_*.zarr"))
     if "speeds" in whole:
         assert 0 < found["speeds"] < whole["speeds"] == int(command.split()[3])
     if "stored" in whole:
         assert 0 < whole["stored_before"] == found["stored"] < whole["stored"]
+
+
+@pytest.mark.wide
+def test_an_interrupted_report_ends_with_the_verdict_so_far(tmp_path: Path):
+    status, found, _ = ran(tmp_path, "interrupted", "report 1a --operating 9000-9500")
+    assert status == 130 and found["partial"] and found["verdict"] and not list(tmp_path.glob("*.html"))
+
+
+def test_unfinished_speeds_are_those_of_one_bearing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A law that is chosen, with the same numbers, makes another bearing."""
+    path, kept = tmp_path / "own.toml", []
+
+    def sweep(*_: Any, store: Path, **__: Any):
+        kept.append(store)
+        raise jc.lanes.Stop
+
+    monkeypatch.setattr(jc, "sweep", sweep)
+    for law in ("constant", "cylinder", "constant"):
+        path.write_text(f'model = "bearing"\nbase = "nu2310"\n[drag]\ndrag_law = "{law}"\n')
+        main(["sweep", str(path), "--out", str(tmp_path)])
+    assert kept[0] == kept[2] != kept[1]
 
 
 def test_the_time_is_estimated_if_it_is_long(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):

@@ -1,5 +1,6 @@
 """The report: verdicts, sources of values, the page's words and tables, and the page in a real browser."""
 
+import dataclasses
 import html.parser
 import re
 import shutil
@@ -9,10 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from report_example import RATIO, sections, swept
+from report_example import RATIO, orbits, sections, swept
 
 import jaxcage as jc
 from jaxcage.cli.options import read_range
+from jaxcage.cli.orbit_commands import of_orbits
 from jaxcage.cli.subject import Subject
 from jaxcage.show import page
 
@@ -24,6 +26,12 @@ PER_RPM = np.pi / 30
 def text() -> str:
     at = 12500 * PER_RPM, 15000 * PER_RPM
     return page("Case 1a", "A bearing", sections(), sweep=swept(), operating=at, command="jaxcage report 1a")
+
+
+def test_an_orbit_that_is_nowhere_stable_is_no_stable_one():
+    found = dataclasses.replace(orbits(swept()), stretches=())
+    said = of_orbits(Subject("1a", jc.case("1a")), found, jc.unstable_ranges(found)).sentence
+    assert said == "No synchronous orbit that was found is stable."
 
 
 @pytest.mark.parametrize(

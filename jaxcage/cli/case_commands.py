@@ -17,7 +17,7 @@ from . import options as o
 from .answer import Answer
 from .check_command import at_best_guess, chances, check
 from .orbit_commands import bars, explained, gradient, mapped, of_orbits
-from .progress import report as tell, visible
+from .progress import interrupted, report as tell, visible
 from .speed_commands import simulate, swept
 from .subject import RPM, Subject
 
@@ -107,6 +107,8 @@ def report(
         words += ["--operating", f"{operating[0]:g}-{operating[1]:g} rpm {subject.speeds}"]
     elif subject.unknowns and draws:
         parts.append(("Chances", chances(subject, subject.range(over, 40), draws, seed, run)))
+    if interrupted():
+        return parts[0][1]
     count = over.count or subject.usual(126 if quick else 251, 5 if quick else 13)
     found, answer = swept(subject, np.linspace(low, high, count), run)
     if subject.with_rollers:

@@ -28,7 +28,7 @@ def check(
     seed: o.Seed = 0,
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Does the cage stay calm over an operating range, with what probability and margin, and what to change first."""
+    """The verdict for an operating range: calm or not, with its probability and margin, and what to change first."""
     subject, ends = subject.operating(operating)
     if subject.with_rollers:
         return _with_rollers(subject, ends)
@@ -48,7 +48,7 @@ def check(
     else:
         checked = d.check_design(subject.model, ends, progress=report_lanes)
         over = subject.over(*checked.speeds_rpm[[0, -1]] / RPM)
-        document = {"verdict": "calm" if checked.calm else "not calm", "checked": checked}
+        document = {"verdict": checked.state, "checked": checked}
         found = Answer(jc.show.range_sentence(over, None, checked), notes=[f"Checked: {checked}"], document=document)
     model = 'The cage model prescribes the impacts of the rollers; slip and forces: a file with model = "bearing"'
     document = {"operating_rpm": [end * RPM for end in ends], **found.document}
@@ -70,10 +70,11 @@ def at_best_guess(said: str) -> str:
 
 
 def chances(subject: Subject, speeds: Any, draws: int, seed: int, run: o.RunOptions = o.RunOptions()) -> Answer:
-    """How likely a cage with unknown values is calm at all speeds [rad/s], and what would decide it; first of the
-    tables is the one by speed. Draws run for at most 100 revolutions after 100."""
+    """Answer on the probability that a cage with unknown values is calm at all speeds [rad/s], and on what would decide
+    it; the first of its tables is the one by speed. Draws run for at most 100 revolutions after 100."""
     d, most = jc.design, jc.design.REVOLUTIONS
-    length: dict[str, Any] = {name: min(getattr(run, name) or most, most) for name in ("discard", "revolutions")}
+    given = {"discard": run.discard, "revolutions": run.revolutions}
+    length: dict[str, Any] = {name: most if x is None else min(x, most) for name, x in given.items()}
     length |= {"blocks": o.blocks_of(length["revolutions"]), "draws": draws, "seed": seed, "method": run.method}
     found = d.ensemble(subject.model, subject.unknowns, speeds, **length, progress=partial(report_lanes, "draws"))
     if found.failed.all():

@@ -72,7 +72,11 @@ def design(
             raise InputError(f"Option --operating {orbits}, but {subject.name} is a bearing.")
         if calm.operating is None:
             raise InputError(f"Option --search {search} goes with --operating.")
+        if price or steps is not None:
+            raise InputError("Options --price and --steps go with a search on simulations, without --operating.")
         return _calm_design(subject, bounds, calm, notes, search=search, seed=seed)
+    if calm.operating is not None:
+        raise InputError("Option --search surrogate goes without --operating, over --first to --last.")
     prices = read_prices(price, subject.usual({"cost": 1e3}, dict.fromkeys(WEIGHED, 1.0)))
     runs = _runs(subject, over, means, seed)
     if subject.with_rollers:

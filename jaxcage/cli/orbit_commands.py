@@ -118,6 +118,7 @@ def of_orbits(subject: Subject, found: Any, loss: Any) -> Answer:
         notes.append(f"Settled orbits that are on no branch: {found.missed}")
     without, count = ", ".join(jc.show.zone_words(zone, beside) for zone in loss.zones), len(found.stretches)
     said = f"A synchronous orbit is stable at every speed{f' except {without}' if without else ''}."
+    said = said if count else "No synchronous orbit that was found is stable."
     said += f" It is in {count} pieces; at the end of one the cage goes over to another motion." if count > 1 else ""
     document = {"points": [jc.show.point_record(p, found) for p in found.points], "missed": found.missed}
     return Answer(said, tables, notes, document, files)

@@ -103,8 +103,7 @@ def swept(subject: Subject, speeds: Any, run: o.RunOptions, out: str | None = No
     bearing with its rollers the sweep can be stopped."""
     kept, settings = None, jc.lanes.Run.of(subject.model, **run.settings)
     if subject.with_rollers and out is not None:
-        numbers = {name: float(x) for name, x in jc.parameters(subject.model).items()}
-        given = numbers, speeds.tolist(), run.settings, jc.solve.cores()
+        given = jc.files.configuration(subject.model), speeds.tolist(), run.settings, jc.solve.cores(), jc.__version__
         kept = Path(out) / f"sweep_{subject.name}_unfinished_{zlib.crc32(repr(given).encode()):08x}.zarr"
         advise("finished speeds are kept, and the same command goes on from there")
     stage = f"lanes of {settings.discard + settings.revolutions} revolutions"
@@ -321,8 +320,11 @@ def study(
         raise NoResult(f"The store '{path}' is damaged: {again}.") from error
     dims, counts, size = found["label"].dims, counted(found), found["label"].size
     if left := counts.pop("pending", 0):
-        if not counts:
+        if not counts and interrupted():
             raise KeyboardInterrupt
+        if not counts:
+            part = "/".join(map(str, settings["shard"]))
+            raise InputError(f"Option --shard must be a part with lanes, but {part} has none: name fewer parts.")
         say(f"Warning: {jc.show.counted(left, 'lane')} left{'' if interrupted() else ' for the other shards'}.")
     lanes = found.stack(lane=dims)
     jc.show.require_some(lanes.isel(lane=np.flatnonzero(lanes["label"].values != "pending")))

@@ -39,12 +39,12 @@ class Subject:
 
     @property
     def own(self) -> Any:
-        """Whose speed the model's is: `cage` or `shaft`."""
+        """Owner of the speed of the model: `cage` or `shaft`."""
         return self.model.speed_text.split()[0]
 
     @property
     def speeds(self) -> Any:
-        """Whose speeds bare numbers are."""
+        """Owner of speeds that are given as bare numbers: `cage` or `shaft`."""
         return self.bare or (self.own if self.file is None else self.file.speeds)
 
     @property

@@ -47,7 +47,7 @@ FUNCTIONS: tuple[Callable[..., Answer], ...] = (
     *(speed.poincare, case.statics, case.report),
 )
 COMMANDS = {function.__name__.rstrip("_"): function for function in FUNCTIONS}
-CALLED = {"directions": "by", "lanes": "chunk", "samples": "sample", "settle": "discard", "confirm": "no_confirm"}
+CALLED = {"directions": "by", "samples": "sample", "settle": "discard", "confirm": "no_confirm"}
 CALLED |= {"method": "solver", "centrifugal_force": "speed", "blocks": "revolutions", "store": "out"}
 CALLED |= {"x": "points", "y": "points"}
 """Option that sets an argument of the library, where it has another name."""

@@ -35,6 +35,12 @@ class Checked:
         """True if every trajectory ended on a period-1 orbit."""
         return self.shares.get("periodic-1") == 1.0
 
+    @property
+    def state(self) -> str:
+        """The verdict `calm` or `not calm`; `not decided` if some trajectories failed and all others are calm."""
+        others = self.shares.keys() - {"periodic-1", "failed"}
+        return "calm" if self.calm else "not calm" if others else "not decided"
+
     def __str__(self) -> str:
         share = 100 * self.shares.get("periodic-1", 0.0)
         said = f"{share:.1f} % of {self.initial_states} initial states at {self.speeds_rpm.size} speeds end calm"

@@ -39,7 +39,8 @@ ERROR = 1e-2
 RARE = 0.05
 """Chance up to which a speed is called calm; from 1 - RARE on it is called chaotic."""
 FEWEST = 29
-"""Least number of draws for a verdict: at a chance of 10 %, this many contain no chaotic one in 5 % of cases."""
+"""Least number of draws for a verdict and for indices: at a chance of 10 %, this many contain no chaotic one in 5 % of
+cases."""
 CONFIDENCE = 0.95
 BINS = 4
 """Number of parts of a range whose chances are compared, to estimate how much an unknown explains."""
@@ -178,9 +179,9 @@ def binomial_interval(
 
 def indices(found: Ensemble, outcome: Shaped[np.ndarray, " draws"], known: Bool[np.ndarray, " draws"]) -> list[Index]:
     """First-order indices of all unknown values for an outcome of each draw, such as chaos in a range, over the known
-    draws, largest first; empty if all of these agree."""
+    draws, largest first; empty if all of these agree or there are fewer than `FEWEST`."""
     y, rows = np.asarray(outcome, dtype=float)[known], []
-    if not np.any(y != y[:1]):
+    if y.size < FEWEST or not np.any(y != y[:1]):
         return []
     picks = np.random.default_rng(0).integers(len(y), size=(RESAMPLED, len(y)))
     for unknown, place, source in zip(found.unknowns, found.place[known].T, found.sources, strict=True):

@@ -59,8 +59,9 @@ def study(
     **Arguments:**
 
     - `model`: a cage, a whole bearing or a system of your own.
-    - `vary`: parameters by name. Arrays are axes of a grid [SI]; all `jaxcage.files.Range` are sampled together. The
-        speed [rad/s], of the shaft for a whole bearing, must be among them; `oil` is the ISO VG grade of a mineral oil.
+    - `vary`: parameters by name. Arrays are axes of a grid [SI]; all `jaxcage.files.Range` are sampled together,
+        those of more than a decade by their logarithms. The speed [rad/s], of the shaft for a whole bearing, must be
+        among them; `oil` is the ISO VG grade of a mineral oil.
     - `store`: the folder.
     - `samples`, `seed`: number of samples (a scrambled Sobol sequence; preferably a power of 2) and seed.
     - `initial_states`: number of the model's own initial states to run at each point, by default all.

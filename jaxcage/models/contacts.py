@@ -107,7 +107,7 @@ class Traction(eqx.Module):
         return self.at(1.0)
 
     def at(self, thickness: Scalar) -> TractionCurve:
-        """The law in oil whose viscosity is `thickness` times that for which the curve holds.
+        """The law in oil whose viscosity is `thickness` times that for which the curve holds, its `viscosity_1`.
 
         While the oil in the contact is Newtonian, the slope is eta_p/(p h) with the viscosity eta_p at the mean
         pressure p and the film thickness h (C. R. Evans and K. L. Johnson, Proc. IMechE C 200 (1986) 313). With

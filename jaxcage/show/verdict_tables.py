@@ -31,12 +31,16 @@ def range_sentence(over: str, chance: RangeChance | None, checked: Checked | Non
     assert checked is not None
     if checked.calm:
         return f"Calm: over {over} all {checked.initial_states} initial states end on the calm motion at every speed."
-    share = checked.shares.get("periodic-1", 0.0)
-    if share == 0:
-        return f"The cage rattles: over {over} no simulation ends on a calm motion."
-    where = "at every speed" if checked.chaotic_rpm.size == checked.speeds_rpm.size else "at some speeds"
+    share, lost = (100 * checked.shares.get(label, 0.0) for label in ("periodic-1", "failed"))
+    failures = f", and {lost:.1f} % failed" if lost else ""
+    if checked.state == "not decided":
+        return f"Not decided: over {over} {share:.1f} % of the simulations end calm{failures}."
+    everywhere = checked.chaotic_rpm.size == checked.speeds_rpm.size
+    if share == 0 and everywhere:
+        return f"The cage rattles: over {over} no simulation ends on a calm motion{failures}."
+    where = "at every speed" if everywhere else "at some speeds"
     where = f"and chaos is seen {where}" if checked.chaotic_rpm.size else "the others on other motions"
-    return f"Not calm from every initial state: over {over} {100 * share:.1f} % end calm, {where}."
+    return f"Not calm from every initial state: over {over} {share:.1f} % end calm, {where}{failures}."
 
 
 def margin_sentence(found: Margins | str, whose: str, ratio: float) -> str:
@@ -98,8 +102,10 @@ def forces_table(found: Mapping[str, Mapping[str, float]]) -> Table:
 def forces_note(found: Mapping[str, Mapping[str, float]], unknown: Sequence[str]) -> str:
     """Note on the largest lasting force at the last speed, with the names of the unknown values that decide it."""
     at, forces = list(found.items())[-1]
+    if any(map(math.isnan, forces.values())):
+        return f"The largest force on the cage at {at} is not known: the simulation there failed"
     lasting = [name for name in forces if name != ONE_ROLLER]
-    first, second, *_ = sorted(lasting, key=lambda name: np.nan_to_num(forces[name]), reverse=True)
+    first, second, *_ = sorted(lasting, key=lambda name: forces[name], reverse=True)
     said = f"Largest force on the cage at {at}: {first}, {forces[first] / forces[second]:.2g} times the next, {second}"
     by = [label for label in unknown if label.startswith(f"{first}.")]
     return f"{said}; unknown about it: {', '.join(by)}" if by else said
@@ -118,7 +124,7 @@ def indices_table(rows: Sequence[Index]) -> Table:
 def indices_note(rows: Sequence[Index]) -> str:
     """Note on the value to measure first, if the draws show it."""
     if not rows:
-        return "All draws agree: no unknown value within its range changes the verdict."
+        return "The finished draws agree, or are too few to tell which unknown value changes the verdict."
     if not rows[0].telling:
         return "The draws do not tell which unknown value to measure first (no index exceeds twice its error)."
     return f"Measure {rows[0].label} first: {rows[0].source}"
