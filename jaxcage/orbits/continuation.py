@@ -8,6 +8,7 @@ corrections of all curves run in chunks of one compiled program on all cores.
 
 import concurrent.futures
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -56,8 +57,12 @@ Start = tuple[np.ndarray, float]
 """A state [SI] and the value of the parameter."""
 
 
-class ContinuationProblem(eqx.Module):
-    """Equations of orbits or of bifurcation points, and the range in which their curves are followed."""
+@dataclasses.dataclass(frozen=True, eq=False)
+class ContinuationProblem:
+    """Equations of orbits or of bifurcation points, and the range in which their curves are followed.
+
+    It is no `equinox.Module`, of which each call of a method makes a new one: there are thousands on a branch.
+    """
 
     equations: AbstractEquations
     given: Given
@@ -65,22 +70,22 @@ class ContinuationProblem(eqx.Module):
     lower: Float[np.ndarray, " parameters"]
     upper: Float[np.ndarray, " parameters"]
 
-    @property
+    @functools.cached_property
     def parameter(self) -> Parameter:
         """The first free parameter."""
         return self.equations.problem.parameters[0]
 
-    @property
+    @functools.cached_property
     def units(self) -> np.ndarray:
         """Units of the free parameters."""
         return np.asarray(self.equations.problem.units)
 
-    @property
+    @functools.cached_property
     def scale(self) -> np.ndarray:
         """Units of the state."""
         return np.asarray(self.equations.problem.scale)
 
-    @property
+    @functools.cached_property
     def turns(self) -> np.ndarray:
         """Revolutions of the unknowns that are angles."""
         return np.append(self.equations.problem.turns, np.full(self.units.size, ENDLESS))
@@ -93,7 +98,9 @@ class ContinuationProblem(eqx.Module):
 
     def by_rodas4(self) -> "ContinuationProblem":
         """Return the problem with Rodas4, which chooses its number of steps."""
-        return eqx.tree_at(lambda p: (p.equations.problem.method, p.counts), self, by_rodas4())
+        method, counts = by_rodas4()
+        equations = eqx.tree_at(lambda e: e.problem.method, self.equations, method)
+        return dataclasses.replace(self, equations=equations, counts=counts)
 
     def with_stable_steps(self, start: Start) -> "ContinuationProblem":
         """Return the problem, with Rodas4 if it chooses its steps and Runge-Kutta is unstable at `start`."""

@@ -154,8 +154,8 @@ def _followed(problem: ContinuationProblem, start: Points, steps: StepControl) -
         for one in advanced:  # borders from the null vectors at the last point keep the equations far from singular
             known = one.points[-1].aux
             borders = tuple(v / np.linalg.norm(v) for v in (known.left, known.right))
-            place = lambda p: (p.equations.left, p.equations.right)
-            walk.problem = eqx.tree_at(place, walk.problem, borders)
+            equations = eqx.tree_at(lambda e: (e.left, e.right), walk.problem.equations, borders)
+            walk.problem = dataclasses.replace(walk.problem, equations=equations)
     return walk.curves[0]
 
 
