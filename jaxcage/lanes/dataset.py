@@ -111,9 +111,10 @@ def _coordinates(plan: Plan) -> dict[str, Any]:
     words = lambda text, unit: {"long_name": text, "units": unit}
     found[SPEED] = dims, speed, words(model.speed_text, "rad/s")
     found["rpm"] = dims, speed * 30 / np.pi, words(model.speed_text, "rpm")
-    if dims == (SPEED,) and not plan.lanes.several and (other := model.other_speed(speed)) is not None:
-        text, values = other
-        found[f"{text.split()[0]}_rpm"] = dims, np.asarray(values) * 30 / np.pi, words(text, "rpm")
+    if dims == (SPEED,) and not plan.lanes.several and (other := model.other_speed(1.0)) is not None:
+        text = other[0]
+        values = np.array([float(model.other_speed(w)[1]) for w in speed])  # pyright: ignore
+        found[f"{text.split()[0]}_rpm"] = dims, values * 30 / np.pi, words(text, "rpm")
     return found
 
 
