@@ -112,7 +112,8 @@ def test_nan_and_infinity_are_refused_in_every_option(
     listed = capsys.readouterr().out
     flags = re.findall(r"^[│ ] +(--[a-z-]+) (?:INT|FLOAT|RPM)\b", listed, flags=re.M)
     assert flags or command == "identify"
-    cases = {"compare": ["1a", "1b"], "identify": ["1a", "data.csv"]}.get(command, ["1a"])
+    cases = {"compare": ["1a", "1b"], "identify": ["1a", "data.csv"], "check": ["1a", "--operating=9000-9500"]}
+    cases = cases.get(command, ["1a"])
     speed = ["--speed=8500"] if command in ("simulate", "poincare") else []
     for flag in flags:
         for wrong in ("nan", "inf", "-inf"):

@@ -110,8 +110,8 @@ def test_derivatives_by_every_parameter_of_the_impact():
     "designation, material", [("NU2310", "brass"), ("NU1014", "brass"), ("NU1014", "PEEK"), ("NU215", "brass")]
 )
 def test_whole_bearings_agree_within_a_factor(designation: str, material: str):
-    """Largest pocket force within 2, first harmonic within 5, at 1.3 and 2 times the reference speed; with `pytest -s`
-    the rows of the table in docs/whole-bearing.md."""
+    """Largest pocket force within 2, first harmonic within the range of the factor `unmatched`, 0.03 to 2.5 beside its
+    best guess of 0.5, at 1.3 and 2 times the reference speed; with `pytest -s` the rows of the table in docs/theory.md."""
     found = listed(designation)
     rib, load = float(found.bearing.rib_diameter), 0.03 * found.dynamic_rating
     same: dict[str, Any] = {"bearing": {"designation": designation}, "material": material, "load": load}
@@ -125,7 +125,7 @@ def test_whole_bearings_agree_within_a_factor(designation: str, material: str):
         once = float(runs["synchronous_force_x_N"][i].mean()), float(amplitude(alone, speed))
         row = f"{peak[0]:.0f} | {peak[1]:.0f} | {peak[0] / peak[1]:.2f} | {once[0]:.2f} | {once[1]:.2f}"
         print(f"| {designation}, {material} | {shaft[i] * 30 / np.pi:.0f} | {row} | {once[0] / once[1]:.2f} |")
-        assert 1 / 2 < peak[0] / peak[1] < 2 and 1 / 5 < once[0] / once[1] < 5
+        assert 1 / 2 < peak[0] / peak[1] < 2 and 0.03 / 0.5 < once[0] / once[1] < 2.5 / 0.5
 
 
 @pytest.mark.wide
