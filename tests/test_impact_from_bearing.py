@@ -111,7 +111,7 @@ def test_derivatives_by_every_parameter_of_the_impact():
 )
 def test_whole_bearings_agree_within_a_factor(designation: str, material: str):
     """Largest pocket force within 2, first harmonic within the range of the factor `unmatched`, 0.03 to 2.5 beside its
-    best guess of 0.5, at 1.3 and 2 times the reference speed; with `pytest -s` the rows of the table in docs/theory.md."""
+    best guess of 0.5, at 1.3 and 2 times the reference speed; `pytest -s` prints the table in docs/theory.md."""
     found = listed(designation)
     rib, load = float(found.bearing.rib_diameter), 0.03 * found.dynamic_rating
     same: dict[str, Any] = {"bearing": {"designation": designation}, "material": material, "load": load}
