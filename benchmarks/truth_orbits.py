@@ -92,9 +92,14 @@ def orbit_beside(subject: Subject, orbit: jc.Orbit) -> Beside:
 
 
 def edges(subject: Subject, orbit: jc.Orbit) -> list[Any]:
-    """Bifurcations near an orbit of period one, those with stability on one side first, the least certain of them."""
+    """Bifurcations near an orbit of period one, those with stability on one side first, the least certain of them.
+    There are none where the branch needs more steps than continuation takes: the orbit is counted beside its steps."""
     speed = float(orbit.speed)
-    found = jc.branch(subject.model, orbit, lower=speed / SPAN, upper=speed * SPAN)
+    try:
+        found = jc.branch(subject.model, orbit, lower=speed / SPAN, upper=speed * SPAN)
+    except ValueError as error:
+        print(f"  {subject.kind} {subject.name}: {error}", flush=True)
+        return []
     shootable = [p for p in found.special if p.kind in ("fold", "period-doubling", "Neimark-Sacker")]
     return sorted(shootable, key=lambda p: (not p.edge, -p.error))
 
