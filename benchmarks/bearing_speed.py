@@ -44,7 +44,7 @@ CHECKED = 3
 
 
 def measured(run: Callable[[], Any]) -> tuple[Any, float, float]:
-    """What a call gives, its wall time and its processor time [s]."""
+    """Return what a call gives, its wall time and its processor time [s]."""
     wall, processor = time.perf_counter(), time.process_time()
     found = run()
     return found, time.perf_counter() - wall, time.process_time() - processor

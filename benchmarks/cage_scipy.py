@@ -1,4 +1,4 @@
-"""What a worker process does for the SciPy rivals. Nothing here imports JAX."""
+"""Work of a process for the SciPy rivals. Nothing here imports JAX."""
 
 import numpy as np
 from scipy.integrate import odeint, solve_ivp

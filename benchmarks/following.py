@@ -70,7 +70,7 @@ def beside(followed: dict[str, Followed], otherwise: tuple[float, float]) -> tup
 
 
 def same(edge: Sensitivity, point: Point) -> bool:
-    """Whether both are the same bifurcation."""
+    """Return True if both are the same bifurcation."""
     return edge.kind == point.kind and abs(edge.value_rpm / float(point.speed_rpm) - 1) < SAME
 
 
@@ -81,7 +81,7 @@ def verdict(
     fresh: dict[str, Point],
     found: Followed,
 ) -> str:
-    """What became of an edge (see the head of this file)."""
+    """Say what became of an edge (see the head of this file)."""
     model, other = models
 
     def leads_back(reached: Point) -> bool:

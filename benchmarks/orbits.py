@@ -39,7 +39,7 @@ PAGE = pathlib.Path(__file__).with_suffix(".md")
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """What one program made of a branch."""
+    """Results of one program for a branch."""
 
     program: str
     points: int = 0
@@ -119,7 +119,7 @@ def by_us(name: str, state: np.ndarray) -> Row:
 
 
 def ask(module: str, *words: str, cache: str = "off") -> dict[str, Any]:
-    """What a process of its own prints last."""
+    """Return what a process of its own prints last."""
     command = [sys.executable, "-m", module, *words]
     environment = {**os.environ, "JAXCAGE_CACHE": cache}
     done = subprocess.run(command, capture_output=True, text=True, env=environment)

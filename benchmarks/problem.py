@@ -1,4 +1,4 @@
-"""What every rival gets: states on the attractors of one case, the constants of the equations, the measure of error."""
+"""Data of all rivals: states on the attractors of one case, constants of the equations, and the measure of error."""
 
 import dataclasses
 

@@ -86,7 +86,7 @@ def corrected(rates: Rates, u: np.ndarray, normal: np.ndarray) -> Orbit | None:
 
 
 def tests(orbit: Orbit) -> dict[str, float]:
-    """What vanishes at a fold and at a period doubling."""
+    """Function that vanishes at a fold and at a period doubling."""
     n = orbit.u.size - 1
     return {
         "fold": float(orbit.tangent[n]),

@@ -1,4 +1,4 @@
-"""What the package says beside finer steps and beside independent integrators: `python -m benchmarks.truth`.
+"""Statements of the package beside finer steps and beside independent integrators: `python -m benchmarks.truth`.
 
 Looked at are the six cases and random legal models: `narrow` ones near the paper's case 1a, `wide` ones anywhere in the
 declared ranges. Finer is 8 times the steps at 16^-3 of the tolerance; the reference is `tests/reference`, the cage's

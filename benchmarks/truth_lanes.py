@@ -48,12 +48,12 @@ class Lane(NamedTuple):
 
     @property
     def known(self) -> bool:
-        """Whether the reference is certain."""
+        """True if the reference is certain."""
         return self.noise <= NOISE * CERTAIN
 
     @property
     def success(self) -> bool:
-        """What the package says."""
+        """Statement of the package."""
         return self.label not in ("failed", "inaccurate")
 
     @property

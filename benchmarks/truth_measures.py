@@ -42,7 +42,7 @@ class Numbers(NamedTuple):
 
 
 def numbers(model: jc.CageModel, run: jc.Trajectory, revolutions: int) -> Numbers:
-    """Of a trajectory that has one revolution more than is measured."""
+    """Measures of a trajectory that has one revolution more than is measured."""
     end = revolutions * run.samples
     part = {name: getattr(run, name)[:end] for name in ("time", "tau", "state", "speed")}
     found = jc.measures(model, dataclasses.replace(run, **part)).value
@@ -63,7 +63,7 @@ def by_reference(model: jc.CageModel, run: jc.Trajectory, revolutions: int) -> N
 
 
 def apart(model: jc.CageModel, run: jc.Trajectory, ours: Numbers, theirs: Numbers) -> dict[str, float]:
-    """How far two histories are apart, by the names of `OFF`."""
+    """Distances of two histories, by the names of `OFF`."""
     film = np.max(np.linalg.norm(jc.analysis.cage_forces(model, run)["film"], axis=1))
     size = max(theirs.force, float(film))
     whirl = abs(ours.whirl - theirs.whirl)

@@ -54,7 +54,7 @@ def random_case_speeds(seed: int, count: int) -> np.ndarray:
 
 
 def described(seed: int, model: CageModel) -> str:
-    """What a model is made of."""
+    """Words for the laws of a model."""
     given = reference.numbers_of(model)
     rib = ", elastic rib" if given["rib"]["kind"] == "elastic" else ""
     supply = ", supply" if given["film"]["supply_pressure"] else ""

@@ -68,7 +68,7 @@ def found_orbits(subject: Subject, quick: bool) -> Iterator[jc.Orbit]:
 
 
 def finer(orbit: Any, times: int = TIMES) -> FixedSteps:
-    """What an orbit or a point is by, with more steps."""
+    """Method of an orbit or a point, with more steps."""
     assert isinstance(orbit.method, FixedSteps)
     return FixedSteps(orbit.method.solver, times * int(orbit.steps))
 
@@ -122,7 +122,7 @@ HEAD = f"{'':44s}" + "".join(f"{x:>10s}" for x in COLUMNS)
 
 
 def row(beside: Sequence[Beside], unknown: int) -> str:
-    """How many there are, how many are not known, how many are off, and the largest distance."""
+    """Numbers of all, of those not known and of those that are off, and the largest distance."""
     apart = np.nanmax([[b.steps, b.reference] for b in beside]) if beside else np.nan
     return f"{len(beside):10d}{unknown:10d}{sum(b.off for b in beside):10d}{apart:10.0e}"
 

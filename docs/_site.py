@@ -1,4 +1,4 @@
-"""What the site has beyond the files of this folder, made while it is built: see `mkdocs.yml`.
+"""Pages that the site has beyond the files of this folder, made while it is built: see `mkdocs.yml`.
 
 Notebooks, pages that commands write, figures, the reference of every layer and the tables of the glossary become pages
 of the site; links to those files become links to the pages; equations become MathML.
@@ -58,7 +58,7 @@ def _tree() -> Any:
 
 
 def _named(layer: str, name: str) -> Any:
-    """What a layer offers under a name; where a file of the layer has the same name, what the file has."""
+    """Return what a layer offers under a name: the function, where a file of the layer has the same name."""
     found = _tree()[layer][name]
     return found[name] if found.is_module else found
 
@@ -136,7 +136,7 @@ def parameters() -> str:
 
 
 def block(page: str, name: str) -> str:
-    """What a command put between the marks `name` of a page."""
+    """Return what a command put between the marks `name` of a page."""
     text = (ROOT / page).read_text(encoding="utf-8")
     return text.split(f"<!-- made: {name} -->\n")[1].split("\n<!-- end -->")[0]
 
@@ -158,7 +158,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def _moved(link: re.Match[str]) -> str:
-    """Where the site has a file of the checkout."""
+    """Return the place in the site of a file of the checkout."""
     path = pathlib.PurePosixPath(link["path"])
     if str(path) in PLACES:
         return f"]({PLACES[str(path)]}"

@@ -84,7 +84,7 @@ def side_by_side(count):
 
 @pytest.mark.wide
 def test_two_identical_oscillators_double_together():
-    """At the force at which one alone doubles (DOP853)."""
+    """Both double at the force at which one alone does (DOP853)."""
     (point,) = side_by_side(2).special
     assert (point.kind, point.status, point.edge) == ("double period-doubling", "converged", True)
     assert abs(point.value - DOUBLING) < point.error + 2e-9 and point.error < 1e-6

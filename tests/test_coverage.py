@@ -90,7 +90,7 @@ def written(folder: Path, designation: str, lines: dict[str, str]) -> Path:
 
 
 def statements(path: Path, shaft: tuple[float, float], rng: np.random.Generator) -> Statements:
-    """What `check` states of a file, and the motion of bearings drawn from its ranges: twice as many speeds, three
+    """Return what `check` states of a file, and the motion of bearings from its ranges: twice as many speeds, three
     initial states, three times as many revolutions, and a hundredth of the tolerance."""
     file = read_bearing(str(path))
     ends = [jc.rpm(own_rpm(file.model, speed, "shaft")) for speed in shaft]

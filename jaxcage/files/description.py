@@ -11,9 +11,9 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
 from .._allowed import ParameterInfo, allowed as must_be, must_be_given, within
 from .._catalogue import CageMaterial, cage_material, designated, estimated
@@ -149,7 +149,7 @@ def describe(table: Mapping[str, Any]) -> Description:
         raise ConfigError(f"`base` must be one of {', '.join(bases)}, but is {shown(base)}.")
     ranges: Ranges = {}
     rest = {key: value for key, value in table.items() if key not in ("speeds", "model", "base", "material")}
-    material = _material(table["material"]) if "material" in table else None
+    material = _listed("material", table["material"], cage_material, "PEEK-GF30") if "material" in table else None
     made = {} if material is None else BY_MATERIAL[subject]
     if made and subject == "bearing":
         rest = {"pockets": {}} | rest
@@ -328,22 +328,21 @@ def require_within(name: str, number: float, info: ParameterInfo, given: Any) ->
     raise ConfigError(f"`{name}` {must_be(info)}, but is {number:g}{unit}{said}.")
 
 
+T = TypeVar("T")
+
+
+def _listed(key: str, given: Any, find: Callable[[str], T], like: str) -> T:
+    """Find an entry of a table by its name in the file."""
+    if not isinstance(given, str):
+        raise ConfigError(f'`{key}` must be a text such as "{like}", but is {shown(given)}.')
+    try:
+        return find(given)
+    except ValueError as error:
+        raise ConfigError(re.sub(r"^Argument `\w+`", f"`{key}`", str(error))) from error
+
+
 def _designation(given: Any) -> str:
-    if not isinstance(given, str):
-        raise ConfigError(f'`bearing.designation` must be a text such as "NU2310", but is {shown(given)}.')
-    try:
-        return designated(given)
-    except ValueError as error:
-        raise ConfigError(str(error).replace("Argument `designation`", "`bearing.designation`")) from error
-
-
-def _material(given: Any) -> CageMaterial:
-    if not isinstance(given, str):
-        raise ConfigError(f'`material` must be a text such as "PEEK-GF30", but is {shown(given)}.')
-    try:
-        return cage_material(given)
-    except ValueError as error:
-        raise ConfigError(str(error).replace("Argument `name`", "`material`")) from error
+    return _listed("bearing.designation", given, designated, "NU2310")
 
 
 def _grade(given: Any) -> float:
