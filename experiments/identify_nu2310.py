@@ -109,7 +109,7 @@ def with_values(model: jc.CageModel, unknowns: Sequence[Unknown], values: dict[s
 
 @dataclasses.dataclass(frozen=True)
 class Stage:
-    """How long and how finely designs are looked at, and how many."""
+    """Lengths, resolutions and numbers of designs."""
 
     name: str
     horizon: int
@@ -193,7 +193,7 @@ class Search:
             strategy.tell(places, self.scores(np.array(places)).tolist())
 
     def scores(self, places: np.ndarray) -> np.ndarray:
-        """How far designs are from what was published: the mean over the cases plus half the worst."""
+        """Distance of designs from what was published: the mean over the cases plus half the worst."""
         parts = np.array_split(places, -(-len(places) // TOGETHER))
         return np.concatenate([self._scores_together(part) for part in parts])
 

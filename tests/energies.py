@@ -10,7 +10,7 @@ from jaxcage.models import BearingAtSpeed, BearingState, Bodies, Rollers
 
 
 def kinetic_energy(at: BearingAtSpeed, state: BearingState) -> Array:
-    """Of rollers, cage (about its mass centre) and the inner ring's centre [J]."""
+    """Kinetic energy of rollers, cage (about its mass centre) and the inner ring's centre [J]."""
     rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
     square = rollers.radial**2 + (rollers.radius * rollers.orbit) ** 2
     of_rollers = jnp.sum(at.roller_mass * square + at.roller_inertia * rollers.spin**2) / 2
@@ -20,7 +20,7 @@ def kinetic_energy(at: BearingAtSpeed, state: BearingState) -> Array:
 
 
 def potential_energy(at: BearingAtSpeed, state: BearingState) -> Array:
-    """Of weight, load and all contacts [J]."""
+    """Potential energy of weight, load and all contacts [J]."""
     rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
     geometry = at.forces(state).geometry
     weight = at.model.cage_mass * mass_centre(at, state)[1] + at.model.ring.ring_mass * cage.ring_y

@@ -24,7 +24,7 @@ from jaxcage import bearing, forces
 
 
 class Number(NamedTuple):
-    """What they have, how far from it the source lets an exact number be, and where it is from."""
+    """Their number, how far from it the source lets an exact number be, and where it is from."""
 
     value: float
     tolerance: float

@@ -92,7 +92,7 @@ def film_coefficients(eccentricity_ratio: Scalar, film: FilmModel = "fixed_half"
 
 
 class WhirlThreshold(NamedTuple):
-    """Where the equilibrium of a rigid mass in its film loses stability."""
+    """Speed at which the equilibrium of a rigid mass in its film loses stability."""
 
     speed: Array
     """omega sqrt(c/g) above which it whirls; infinite where it never does."""

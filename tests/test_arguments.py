@@ -1,4 +1,4 @@
-"""What is refused before anything is computed: wrong arguments, speeds in rpm, tracing, wrong laws, precision."""
+"""Refusals before anything is computed: wrong arguments, speeds in rpm, tracing, wrong laws, precision."""
 
 import inspect
 import math

@@ -1,4 +1,4 @@
-"""What the commands for a cage compute, print and store, at small sizes, beside the same calls of the library."""
+"""Commands for a cage: what they compute, print and store, at small sizes, beside the same calls of the library."""
 
 import html
 import json

@@ -1,4 +1,4 @@
-"""What differs between two designs; the published edges and conclusions beside ours."""
+"""Differences between two designs; the published edges and conclusions beside ours."""
 
 import re
 

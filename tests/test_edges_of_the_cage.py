@@ -101,7 +101,7 @@ MOVES = [("guidance_gap", 3e-4), ("eccentricity", 1e-3), ("cage_mass", 1e-3)]
 @pytest.mark.parametrize("name, step", wide_but(MOVES, MOVES[0]))
 @pytest.mark.parametrize("kind", KINDS)
 def test_elasticities_against_differences(kind, name, step, found):
-    """Of fourth order, of edges located anew with the parameter changed."""
+    """Differences of fourth order, of edges located anew with the parameter changed."""
     if kind == "fold":
         step = step / 10
     value = float(jc.parameters(CASE)[name])

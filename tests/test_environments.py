@@ -27,7 +27,7 @@ def command(folder: Path, environment: dict[str, str], *arguments: str) -> subpr
 
 
 def numbers(found: subprocess.CompletedProcess[bytes]) -> dict[str, object]:
-    """What was found, whatever it was called and however long it took."""
+    """Results that were found, whatever it was called and however long it took."""
     assert found.returncode == 0, found.stderr
     document = json.loads(found.stdout)
     return {k: v for k, v in document.items() if k not in ("seconds", "figure", "data", "case")}

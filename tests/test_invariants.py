@@ -1,4 +1,4 @@
-"""What must stay the same whatever the numbers: frames, mirrors, units, energy, dissipation, phase volume.
+"""Properties that must stay the same whatever the numbers: frames, mirrors, units, energy, dissipation, phase volume.
 
 Parameters, speeds and states are drawn from physical ranges. One program serves all draws of a test.
 """
@@ -103,7 +103,7 @@ FLIP = np.array([1.0, -1.0])
 
 
 def mirrored(model):
-    """What a mirror on the x axis shows: gravity up, the impact and the cross-coupling with the other sign."""
+    """Image that a mirror on the x axis shows: gravity up, the impact and the cross-coupling with the other sign."""
     signs = dict.fromkeys(("gravity", "amplitude", "reference_speed", "cross_stiffness", "cross_cubic"), -1.0)
     values = jc.parameters(model)
     return beyond_range(model, **{n: s * values[n] for n, s in signs.items()})
@@ -278,7 +278,7 @@ def energy_defects(model, speed, start, steps):
 
 
 def within(y, model):
-    """Whether a motion keeps off the land, and off the centre, where the fixed half film has a kink."""
+    """True if a motion keeps off the land, and off the centre, where the fixed half film has a kink."""
     eps = np.hypot(*y[:, :2].T) / float(model.clearance)
     return eps.max() < 0.95 and eps.min() > 0.02
 

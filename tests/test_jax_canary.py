@@ -39,7 +39,7 @@ def test_the_integration_kernel_runs_on_this_jax():
 
 
 def asked_of(version: str) -> tuple[list[str], str]:
-    """What a process of its own prints, and its warnings, if JAX were of this version."""
+    """Return what a process of its own prints, and its warnings, if JAX were of this version."""
     code = (
         f"import jax\njax.__version__ = {version!r}\nimport jaxcage as jc\n"
         "try:\n    jc.case('1a')\nexcept RuntimeError as e:\n    print(e)\nprint(jax.config.jax_enable_x64)"

@@ -20,7 +20,7 @@ PAGES = {p.stem: p.read_text() for p in sorted((ROOT / "docs").glob("*.md"))}
 
 
 def run_blocks(page: str) -> tuple[dict, str]:
-    """What the Python blocks of a page leave behind, run in order, and what they print."""
+    """Return what the Python blocks of a page leave behind, run in order, and what they print."""
     space: dict = {}
     out = io.StringIO()
     with contextlib.redirect_stdout(out):

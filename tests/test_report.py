@@ -161,7 +161,7 @@ def report(tmp_path_factory: pytest.TempPathFactory, text: str) -> Path:
 
 @pytest.fixture(scope="module")
 def measured(report: Path) -> list[str]:
-    """What a script measures in the page: the page itself forbids scripts, so its rule is lifted in a copy."""
+    """Return what a script measures in the page: the page itself forbids scripts, so its rule is lifted in a copy."""
     text, changed = re.subn(r'<meta http-equiv="Content-Security-Policy"[^>]*>', MEASURE, report.read_text())
     assert changed == 1
     copy = report.with_name("measured.html")

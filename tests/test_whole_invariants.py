@@ -150,7 +150,7 @@ def test_other_units_give_the_same_motion(base):
 
 @pytest.mark.wide
 def test_derivatives_by_every_parameter():
-    """Of a sum of all rates with random weights, against differences of fourth order."""
+    """Derivatives of a sum of all rates with random weights, against differences of fourth order."""
     model = bearing(drag_coefficient=1.0, churning_coefficient=1.0, outer_speed=30.0, rest=0.01)
     model = jc.replace(model, **{"pockets.pocket_law": "power"})
     state = some_state(model, 5)

@@ -348,7 +348,7 @@ def test_a_lightly_loaded_bearing_skids():
 
 
 def test_simulate_prints_slips_forces_and_losses(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
-    """Of a file, at a load of the command line; figure and data beside it."""
+    """Run of a file, at a load of the command line; figure and data beside it."""
     path = tmp_path / "mine.toml"
     path.write_text('base = "nu2310"\nload = "300 N"')
     asked = [

@@ -1,4 +1,4 @@
-"""What is reported of a run of the whole bearing: forces and slips of each roller, around the bearing; spectra."""
+"""Reports of a run of the whole bearing: forces and slips of each roller, around the bearing; spectra."""
 
 import dataclasses
 
@@ -76,7 +76,7 @@ def test_the_land_wears_where_it_is_touched():
 
 
 def test_the_synchronous_force_of_a_known_one(run):
-    """Of a run whose pocket force is 7 cos(theta - 0.3) + 2 horizontally and 3 sin(2 theta) vertically."""
+    """Harmonics of a run whose pocket force is 7 cos(theta - 0.3) + 2 horizontally and 3 sin(2 theta) vertically."""
     model, ran, _ = run
     theta = ran.angle - ran.angle[0]
     time = theta / 400.0

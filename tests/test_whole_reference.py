@@ -68,7 +68,7 @@ def right_side(model, speed, state):
 
 @pytest.mark.parametrize("kind", wide_but(KINDS, "plain"))
 def test_right_side_at_random_states(kind):
-    """Of either sense of rotation; each row against the largest of its entries."""
+    """Rates of either sense of rotation; each row against the largest of its entries."""
     model = jc.replace(jc.whole_bearing("nu2310"), **KINDS[kind])
     for seed, speed in enumerate((SPEED, SPEED, -SPEED, 0.3 * SPEED)):
         reach = (1.02, 0.6, 0.985, 0.3)[seed]

@@ -88,7 +88,7 @@ class Field:
         return [x / self.omega for x in (*v, *rates)]
 
     def held(self, x: Number, y: Number, vx: Number, vy: Number) -> tuple[Number, Number]:
-        """What acts between cage and rib, on the cage [N]: film, contact and the support of (16) and (20)."""
+        """Forces that act between cage and rib, on the cage [N]: film, contact and the support of (16) and (20)."""
         c = self.clearance
         f_x, f_y = land_force(self.land, x / c, y / c, vx / c, vy / c, self.omega)
         k_x, k_y, cubic, damping, cross, cross_cubic = self.support

@@ -199,7 +199,7 @@ def growth(
 
 
 class Confirmed(NamedTuple):
-    """What two integrators found, and how far they are apart."""
+    """Results of two integrators, and how far they are apart."""
 
     strobe: np.ndarray
     """States at the beginning and after every revolution, in SI units."""

@@ -1,4 +1,4 @@
-"""What a model's numbers say before anything moves: viscosity, loaded zone, restitution."""
+"""Numbers of a model before anything moves: viscosity, loaded zone, restitution."""
 
 import decimal
 import math
