@@ -28,8 +28,8 @@ Report: TypeAlias = Callable[[str, int, int], None]
 _number: int = signal.SIGINT
 _advice = FILES_ARE_WHOLE
 """Words for a user who interrupts."""
-_computes = _stops = _stopped = False
-"""True during a computation, after it was asked to stop, and after its lanes were stopped."""
+_computes = _stops = _stopped = _ends = False
+"""True during a computation, after it was asked to stop, after its lanes were stopped, and once the process ends."""
 _heard = -math.inf
 """Time of the last report of lanes."""
 _report: Report = lambda stage, done, total: None
@@ -55,9 +55,9 @@ def interrupted() -> bool:
     return _stopped
 
 
-def advice() -> str:
-    """Words for a user who interrupts."""
-    return _advice
+def ends() -> bool:
+    """True once an interruption has been raised, which a library may turn into another exception."""
+    return _ends
 
 
 def advise(text: str) -> None:
@@ -95,33 +95,41 @@ def end_at_once_when_interrupted() -> None:
     """End the process at once at Ctrl-C, or when it is told to end, during a computation.
 
     While lanes run, the first Ctrl-C only asks them to stop. Outside a computation, while files are written, the first
-    interruption is raised as usual, so that temporary files are removed.
+    interruption is raised as usual, so that temporary files are removed. Another one ends the process.
     """
     for each in ENDS:
         signal.signal(each, _on_interruption)
 
 
-def interrupted_status() -> int:
-    """Exit status after an interruption: 128 and the number of the signal."""
+def end_interrupted() -> int:
+    """Say that the command was interrupted. Further interruptions are ignored while the process ends.
+
+    **Returns:** exit status: 128 and the number of the signal.
+    """
+    for each in ENDS:
+        if signal.getsignal(each) is _on_interruption:  # which Python would reset to the default while it ends
+            signal.signal(each, signal.SIG_IGN)
+    say(f"Interrupted: {_advice}.")
     return 128 + _number
 
 
 def _on_interruption(number: int, frame: FrameType | None) -> None:
-    global _number, _stops
+    global _number, _stops, _ends
+    if _ends:
+        os._exit(128 + _number)
     _number = number
     if number == signal.SIGINT and _computes and not _stops and time.monotonic() - _heard < LISTENS:
         _stops = True
         say("Interrupted: the answer from what is finished follows; interrupt again to end at once.")
         return
-    for each in ENDS:
-        signal.signal(each, signal.SIG_DFL)
+    _ends = True
     if not _computes:
         raise KeyboardInterrupt
     if sys.stderr.isatty():
         sys.stderr.write(_SHOW_CURSOR_AND_CLEAR_LINE)
-    say(f"Interrupted: {_advice}.")
+    status = end_interrupted()
     sys.stderr.flush()
-    os._exit(interrupted_status())
+    os._exit(status)
 
 
 @contextlib.contextmanager

@@ -28,10 +28,10 @@ from . import (
 from .answer import Answer, complete, print_answer
 from .options import ShowOptions, flag
 from .progress import (
-    advice,
     end_at_once_when_interrupted,
+    end_interrupted,
+    ends,
     interrupted,
-    interrupted_status,
     progress,
     say,
     shorten_warnings,
@@ -78,9 +78,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         say("There is not enough memory for this: ask for fewer speeds, lanes or revolutions.")
         return FAILED
-    except KeyboardInterrupt:
-        say(f"Interrupted: {advice()}.")
-        return interrupted_status()
+    except (KeyboardInterrupt, Exception) as error:
+        if isinstance(error, KeyboardInterrupt) or ends():
+            return end_interrupted()
+        raise
 
 
 def _run(call: functools.partial[Answer]) -> None:
