@@ -83,7 +83,7 @@ LOSSES = {
     "raceway_damping": "damping of the raceway contacts",
     "pocket_friction": "friction in the pockets",
     "pocket_damping": "damping of the pocket contacts",
-    "film": "shearing and squeezing the film of the guiding land",
+    "film": "the film of the guiding land",
     "land_contact": "contact of cage and land",
     "drag": "drag and churning of the rollers",
     "mounting": "damping of the inner ring's mounting",

@@ -79,6 +79,7 @@ from .parameter_tables import (
     differences_table as differences_table,
     readings_words as readings_words,
     sources_table as sources_table,
+    values_words as values_words,
 )
 from .quantity_tables import (
     displacements as displacements,

@@ -115,6 +115,17 @@ def readings_words(model: Any) -> str:
     return ", ".join(f'{READINGS[name]} {words} ("{chosen}")' for name, (chosen, words) in readings_of(model).items())
 
 
+def values_words(model: AbstractForcedSystem, names: Sequence[str]) -> list[str]:
+    """Parameters by dotted name, each with its value: `bearing.radial_clearance = 67.5 µm`."""
+    fields = {".".join(path): (get(model, path), field.metadata.get("parameter")) for path, field in walk(model)}
+    words = []
+    for name in names:
+        value, info = fields[name]
+        unit, number = ("", value) if info is None else shown(float(value), info.unit)
+        words.append(f"{name} = {number:.4g} {unit}".rstrip())
+    return words
+
+
 def differences(models: Sequence[Any]) -> list[dict[str, Any]]:
     """Differences of two designs: dotted name, text, both values [SI], unit and relative change of each."""
     flat = [_flat(configuration(model)) for model in models]
