@@ -187,11 +187,12 @@ def _parse(arguments: list[str]) -> functools.partial[Answer] | None:
     except SystemExit as stop:
         if stop.code in (0, None):
             return None
-        raise InputError(_sentence(box.getvalue())) from stop
+        command = ["jaxcage", *(name for name in arguments[:1] if name in COMMANDS)]
+        raise InputError(_sentence(box.getvalue(), " ".join(command))) from stop
 
 
-def _sentence(box: str) -> str:
-    """Text of an error box of tyro as one sentence.
+def _sentence(box: str, command: str) -> str:
+    """Text of an error box of tyro as one sentence; it ends with the help of `command`.
 
     Parts are separated by rules; the title is in the upper border, or above a rule where there is no line drawing.
     """
@@ -203,4 +204,4 @@ def _sentence(box: str) -> str:
     if found and why.startswith("must "):
         return f"Option {ours} {why}"
     useful = [said, *(part for part in more[:1] if part.startswith("Available"))]
-    return "; ".join(part.rstrip(".") for part in useful) + " (see jaxcage --help)."
+    return "; ".join(part.rstrip(".") for part in useful) + f" (see {command} --help)."

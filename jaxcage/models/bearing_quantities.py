@@ -126,6 +126,12 @@ QUANTITIES: tuple[Quantity, ...] = (
         "first harmonic of the pocket forces, horizontal amplitude",
         of=lambda a: _synchronous("x", a),
     ),
-    Quantity("synchronous_force_y_N", "", "N", "first harmonic of the pocket forces, vertical amplitude", of=lambda a: _synchronous("y", a)),
+    Quantity(
+        "synchronous_force_y_N",
+        "",
+        "N",
+        "first harmonic of the pocket forces, vertical amplitude",
+        of=lambda a: _synchronous("y", a),
+    ),
 )
 """Quantities of a whole bearing; their standard errors follow from the scatter of blocks of revolutions."""
