@@ -94,13 +94,13 @@ def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed:
     """Table of loads and displacements at rest, and the kinematics at a shaft speed [rad/s] if one is given."""
     bearing = model.bearing
     rows: list[tuple[str, Any, str]] = [
-        ("largest roller load", shared.max_load, "N"),
+        ("largest roller load on the inner raceway", shared.max_load, "N"),
         ("shift of the shaft", shared.shaft_shift, "m"),
         ("elastic approach", shared.elastic_approach, "m"),
         ("half angle of the loaded zone", shared.half_angle, "rad"),
     ]
-    for guidance, y in displacements(model, shared).items():
-        rows.append((f"cage displacement, {guidance.replace('_', ' ')} guidance", y, "m"))
+    at_rest = displacements(model, shared)[f"{getattr(model, 'guidance', 'outer')}_rib"]
+    rows.append(("displacement of the cage at rest", at_rest, "m"))
     celsius = float(model.lubricant.temperature) - 273.15
     viscosity = 1e6 * model.lubricant.kinematic_viscosity
     rows.append((f"kinematic viscosity of the oil at {celsius:g} °C", viscosity, "mm^2/s"))
