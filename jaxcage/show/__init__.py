@@ -85,6 +85,7 @@ from .quantity_tables import (
     displacements as displacements,
     mean_over_starts as mean_over_starts,
     quantities_table as quantities_table,
+    quantity_words as quantity_words,
     run_tables as run_tables,
     statics_table as statics_table,
 )

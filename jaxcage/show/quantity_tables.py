@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from ..analysis import Measures, failed, named_lines, scatter
 from ..bearing import LoadDistribution, static_cage_displacements
+from ..quantities import Quantity
 from .run_figures import SPECTRA, Rollers
 from .tables import OWN, UNIT, Column, Table, table
 
@@ -42,6 +43,11 @@ def mean_over_starts(found: xr.Dataset, name: str) -> tuple[Float[np.ndarray, " 
 def head_of(name: str, unit: str) -> str:
     """Column header of a quantity: its name without its unit."""
     return name.removesuffix("_" + unit.replace(" ", "_").replace("^", "").replace("/", "_per_")).replace("_", " ")
+
+
+def quantity_words(quantity: Quantity, value: float) -> str:
+    """A quantity in a sentence, such as `friction power 1187 W`."""
+    return f"{head_of(quantity.name, quantity.unit)} {value:.4g} {quantity.unit}".removesuffix(" 1")
 
 
 def column_of(found: xr.Dataset, name: str) -> Column:
