@@ -85,7 +85,7 @@ LOSSES = {
     "pocket_damping": "damping of the pocket contacts",
     "film": "the film of the guiding land",
     "land_contact": "contact of cage and land",
-    "drag": "drag and churning of the rollers",
+    "drag": "drag, churning and rolling resistance",
     "mounting": "damping of the inner ring's mounting",
 }
 """Kinds of power that is lost, by the names of their integrals."""
