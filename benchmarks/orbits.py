@@ -46,7 +46,7 @@ class Row:
     special: tuple[tuple[str, float], ...] = ()
     """Kind and place [unit of the task]."""
     errors: tuple[float, ...] = ()
-    """Of each place, as the program says; none where it says nothing."""
+    """Error of each place, as the program states it; empty where it states none."""
     cold: float = float("nan")
     process: float = float("nan")
     warm: float = float("nan")

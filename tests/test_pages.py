@@ -58,7 +58,7 @@ def drag(space: dict) -> None:
 
 
 PROMISED = {"python": ueda, "own-force": drag}
-"""What the text of a page promises of its code."""
+"""Check of what the text of a page says of its code."""
 
 
 def test_set_up_commands_are_those_of_the_check():
