@@ -399,8 +399,8 @@ def page(found: dict[str, list[Row]]) -> str:
     reynolds = sum(r.source in OF_REYNOLDS for r in rows)
     lines = [
         f"# Validation\n\n{sum(r.passed for r in rows)} of {len(rows)} comparisons pass: {len(rows) - reynolds} "
-        f"numbers of jaxcage, and {reynolds} of the solver of\nReynolds' equation in `tests/reynolds.py`, with which the "
-        "tests compare the short film of the package: the rows of long\n"
+        f"numbers of jaxcage, and {reynolds} of the solver of\nReynolds' equation in `tests/reynolds.py`, with which "
+        "the tests compare the short film of the package: the rows of long\n"
         "and concentric films, of full bearings and of grooves. "
         f"Made with jaxcage {jc.__version__} by `python tests/literature.py`.\n",
         "A tolerance is what the source supports: half a unit of the last printed digit where ours is exact, more",
