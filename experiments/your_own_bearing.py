@@ -35,7 +35,9 @@ jc.enable_x64()
 
 # %% [markdown]
 # ## The file
-# `jaxcage init my_bearing.toml` writes such a file to start from, with a comment for every line.
+# `jaxcage init my_bearing.toml` writes a file to start from, with a comment for every line. This one differs: its
+# impacts have an amplitude of their own (`kind = "synchronous"`; new files have `from_bearing`), and fewer values are
+# ranges. Its probability is therefore not that of the session in `docs/transcript.md`.
 
 # %%
 Path("out").mkdir(exist_ok=True)

@@ -227,7 +227,7 @@ def design_for(
     check: int = 16,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Design:
-    """Find the cheapest design that is calm over an operating range, with margins, for every bearing within tolerances.
+    """Find the cheapest design that is stable over a range of speed, with margins, for all bearings within tolerances.
 
     **Arguments:**
 

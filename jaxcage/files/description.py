@@ -93,7 +93,7 @@ class Description:
     ranges: Ranges
     table: Mapping[str, Any]
     estimated: tuple[str, ...]
-    """Dotted names of values that no maker prints, estimated for the catalogue or from the material of the cage."""
+    """Dotted names of values that the file does not give, estimated for the catalogue or from the cage material."""
     material: CageMaterial | None = None
     """Material of the cage, if it is named."""
     left: tuple[str, ...] = ()
