@@ -14,17 +14,11 @@
 # within 0.02 mm and whose eccentricity within 2 µm, at the lowest cost of turning and balancing. The edges solve
 # equations, so that their derivatives are exact, and the search needs few designs.
 
-# %% tags=["parameters"]
-GAPS = 9  # at which the edges are shown
-STATES = 16  # from which the chosen design is simulated at each speed
-
 # %%
-import jaxcage as jc  # before JAX, so that compiled programs are kept without remarks of XLA
-
-
-# isort: split
 import matplotlib.pyplot as plt
 import numpy as np
+
+import jaxcage as jc
 
 
 jc.keep_compiled_programs()
@@ -33,6 +27,13 @@ model = jc.case("1a")
 operating = tuple(jc.rpm(12500, 18000, 2))
 vary = {"guidance_gap": (0.35e-3, 0.65e-3), "eccentricity": (8e-6, 30e-6)}
 tolerance = {"guidance_gap": jc.Tolerance(-0.02e-3, 0.02e-3), "eccentricity": jc.Tolerance(-2e-6, 2e-6)}
+
+# %% [markdown]
+# ## Settings of this page
+
+# %% tags=["parameters"]
+GAPS = 9  # number of guidance gaps at which the edges are drawn
+STATES = 16  # initial states from which the chosen design is simulated at each speed
 
 # %% [markdown]
 # ## The stable range over the gap

@@ -13,19 +13,14 @@
 # in three lines. A sweep shows where it becomes chaotic. The cascade of period doublings that leads there gives the
 # force to many digits, and a derivative with respect to a parameter, which a scaling law checks.
 
-# %% tags=["parameters"]
-FORCES, DISCARD, REVOLUTIONS = 400, 300, 200  # of the sweep
-
 # %%
-import jaxcage as jc  # before JAX, so that compiled programs are kept without remarks of XLA
-
-
-# isort: split
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
+
+import jaxcage as jc
 
 
 jc.keep_compiled_programs()
@@ -48,6 +43,14 @@ def oscillator(force, cubic=1.0):
 
 SPEED = 1.2  # of the forcing
 method = jc.method("rodas4", steps=64)
+
+# %% [markdown]
+# ## Settings of this page
+
+# %% tags=["parameters"]
+FORCES = 400  # number of forces in the sweep
+DISCARD = 300  # revolutions before those that are shown
+REVOLUTIONS = 200  # revolutions that are shown
 
 # %% [markdown]
 # ## The first period doubling

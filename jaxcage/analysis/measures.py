@@ -50,7 +50,8 @@ def cage_history(model: CageModel, trajectory: Trajectory) -> CageHistory:
     position, velocity = (q, v) if dim == 4 else (q[:, :2] - q[:, 2:], v[:, :2] - v[:, 2:])
     motion = np.concatenate([position, velocity], axis=1)
     along = _forces(model, *map(jax.numpy.asarray, (trajectory.speed, trajectory.tau, motion)))
-    names = (*FORCES, *(type(law).__name__ for law in model.extra))  # compiled functions sort the keys of dictionaries
+    own, extra = [law.law_name for law in model.forces if law.law_name], [type(law).__name__ for law in model.extra]
+    names = dict.fromkeys([*own, *FORCES, *extra])  # compiled functions sort the keys of dictionaries
     return CageHistory(
         speed=trajectory.speed,
         phase=float(trajectory.tau[-1] - trajectory.tau[0]),

@@ -106,11 +106,11 @@ class Zones:
     transient: tuple[Zone, ...] = ()
     """Zones of chaos that dies out before the horizon, ascending."""
     horizon: int = 0
-    """Revolutions that chaos must last; 0 if lanes were not followed."""
+    """Revolutions that chaos must last, those of the run rounded up to blocks of 30; 0 if lanes were not followed."""
 
     def __str__(self) -> str:
-        lasting = f" of chaos that lasts beyond {self.horizon} revolutions" if self.horizon else ""
-        rows = [f"Chaotic zones{lasting}, at a resolution of {self.resolution_rpm:.0f} rpm"]
+        head = f"Zones of chaos that lasts beyond {self.horizon} revolutions" if self.horizon else "Chaotic zones"
+        rows = [f"{head}, at a resolution of {self.resolution_rpm:.0f} rpm"]
         rows += [f"  zone {i}: {_row(zone)}" for i, zone in enumerate(self.zones, start=1)] or ["  none"]
         if self.transient:
             rows += ["Transient chaos", *(f"  {_row(zone)}" for zone in self.transient)]

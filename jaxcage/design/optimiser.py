@@ -109,8 +109,9 @@ class Design:
         rows = [f"Design: {self.verdict}, cost {self.cost_before:.4g} -> {self.cost:.4g}"]
         rows += [f"  {name} = {value:.6g}" for name, value in self.values.items()]
         for r in self.requirements:
+            unit = "" if r.unit == "1" else f" {r.unit}"
             was = f"{self.before[r.of].value:.4g}" if r.of in self.before else "unknown"
-            rows.append(f"  {r.name}: {was} -> {self.after[r.of].value:.4g} {r.unit} (limit {r.limit:.4g})")
+            rows.append(f"  {r.name}: {was} -> {self.after[r.of].value:.4g}{unit} (limit {r.limit:.4g})")
         return "\n".join(rows)
 
 

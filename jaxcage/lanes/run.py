@@ -144,7 +144,7 @@ def sweep(
     `RuntimeError` without double precision.
     """
     require_x64()
-    require_known("sweep", INSTEAD, model, speeds)
+    require_known("sweep", INSTEAD, model=model, speeds=speeds)
     plan = Plan.over_speed(model, speeds, initial_states)
     run = Run.of(plan.model, **settings)
     if store is None:

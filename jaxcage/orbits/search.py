@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 
 from .._arguments import require_at_least
+from .._errors import ArgumentError
 from ..lanes import states_at, sweep
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
@@ -202,6 +203,8 @@ def synchronous_orbits(
     **Returns:** `SynchronousOrbits`. Simulations may miss stable orbits with a small basin of attraction.
     """
     require_at_least(1, count=count)
+    if not lower < upper:
+        raise ArgumentError("lower", "upper", said=f"must ascend, but {lower:g} and {upper:g} rad/s were given.")
     say = progress or (lambda what, done, of: None)
     apart = _distance_in(system)
 

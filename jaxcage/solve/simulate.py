@@ -201,7 +201,7 @@ def simulate(
     **Raises:** `ValueError` for a speed that is not positive, or impossible counts.
     """
     require_x64()
-    require_known("simulate", INSTEAD, system, speed, start)
+    require_known("simulate", INSTEAD, system=system, speed=speed, start=start)
     options: dict[str, Any] = dict(revolutions=revolutions, samples=samples, discard=discard)
     return ramp(system, speed, speed, **options, start=start, method=method)  # a ramp with equal ends
 
@@ -228,7 +228,7 @@ def ramp(
     **Returns:** `Trajectory` with the speed of each sample.
     """
     require_x64()
-    require_known("ramp", INSTEAD, system, first, last, start)
+    require_known("ramp", INSTEAD, system=system, first=first, last=last, start=start)
     low, high = float(first), float(last)
     require_speeds(system, (low, high))
     require_at_least(1, revolutions=revolutions, samples=samples)
