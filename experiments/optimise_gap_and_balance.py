@@ -66,8 +66,9 @@ plt.show()
 
 # %% [markdown]
 # ## The search
-# Every point is a design whose edges were solved for, also in the corners of its tolerances. Lines are of equal cost;
-# the cost is 2 as given.
+# The cost is the given gap over the gap, for turning, plus the given eccentricity over the eccentricity, for balancing:
+# 2 as given. Lines are of equal cost. Every point is a design whose edges were solved for, also in the corners of its
+# tolerances.
 
 # %%
 best = jc.design_for(model, operating, vary, tolerance=tolerance, check=STATES)
@@ -121,9 +122,15 @@ plt.show()
 # %% [markdown]
 # ## The answer
 # A stable orbit need not attract every initial state: the chosen design is therefore simulated, with other steps than
-# those of the search, and the last line says how often chaos was met and how soon it died out.
+# those of the search.
 
 # %%
 print(best)
 print("At a bound of the search:", ", ".join(best.at_bound) or "nothing")
-print("Checked:", best.checked)
+print("Simulated:", best.checked)
+
+# %% [markdown]
+# ## Conclusion
+# A gap of 0.65 mm, the widest allowed, and an eccentricity of 24.1 µm lower the cost from 2 to 1.65; the edges are 21 %
+# of speed below and 75 % above the range. The cage is not calm from every initial state: 63.5 % of the simulations end
+# calm, and the others meet chaos with a mean life of 74 to 702 revolutions.

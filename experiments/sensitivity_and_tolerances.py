@@ -33,7 +33,7 @@ now = {name: float(jc.parameters(model)[name]) for name in varied}
 # %% tags=["parameters"]
 BEARINGS = 40  # number of random bearings in which the edge is solved for
 SPEEDS = 20  # number of speeds at which each design of the Sobol indices is simulated
-SAMPLES = 128  # number of samples of the Sobol indices
+SAMPLES = 128  # number of base samples of the Sobol indices, each of which takes seven designs
 
 # %% [markdown]
 # ## To first order

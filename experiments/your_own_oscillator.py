@@ -65,7 +65,7 @@ def doubling(system):
 
 
 first = doubling(oscillator(0.26))
-slope = eqx.filter_grad(lambda system: doubling(system).value)(oscillator(0.26))
+slope = jax.grad(lambda system: doubling(system).value)(oscillator(0.26))
 elasticity = float(slope.acceleration.cubic / first.value)
 print(f"the period doubles at a force of {float(first.value):.8f} ± {float(first.error):.0g}")
 print(f"elasticity with respect to the cubic term {elasticity:.8f}")
