@@ -112,9 +112,14 @@ class Measures(dict[str, Measured]):
 
 
 def measures(model: AbstractForcedSystem, trajectory: Trajectory) -> Measures:
-    """Quantities of a time history, preferably of whole revolutions without the transient, that its model reports.
+    """Compute the quantities that a model reports of a time history.
 
-    **Raises:** `ValueError` for a trajectory that failed, or of fewer than 3 samples.
+    **Arguments:** a cage or a whole bearing; its trajectory, preferably of whole revolutions without the transient.
+
+    **Returns:** `Measures`, quantities [SI] by name, with their standard errors for a whole bearing.
+
+    **Raises:** `ValueError` for a trajectory that failed, or of fewer than 3 samples; `RuntimeError` without double
+    precision.
     """
     require_x64()
     allowed = ("successful", "inaccurate") if model.beside else ("successful",)

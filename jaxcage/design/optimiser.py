@@ -247,7 +247,8 @@ def design_for(
 
     **Returns:** `Design`; if none is feasible, that with the least violation, and the requirements in conflict.
 
-    **Raises:** `ValueError` for a range without a stable orbit, or whose stable range does not end in bifurcations.
+    **Raises:** `ValueError` for a range without a stable orbit, or whose stable range does not end in bifurcations;
+    `RuntimeError` without double precision.
     """
     require_x64()
     require_at_least(1, searches=searches)

@@ -49,11 +49,11 @@ of a stiffness of the contact its force at a penetration of one clearance may be
 
 
 def case(name: str, constants: str = "identified") -> CageModel:
-    """The published case `name`, one of 1a, 1b, 2a, 2b, 3a, 3b (Table 2).
+    """Build the model of a published case, one of 1a, 1b, 2a, 2b, 3a, 3b (Table 2).
 
     **Arguments:** name; the set of constants that the paper does not print (`jaxcage.models.CONSTANTS`).
 
-    **Raises:** `ValueError` for an unknown name, `RuntimeError` without double precision.
+    **Returns:** `CageModel`. **Raises:** `ValueError` for an unknown name, `RuntimeError` without double precision.
     """
     require_x64()
     if constants not in CONSTANTS:

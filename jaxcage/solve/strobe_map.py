@@ -34,10 +34,13 @@ class StrobeMap(eqx.Module):
 
 
 def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod | None = None) -> StrobeMap:
-    """Strobe map of `system` at `speed` [rad/s].
+    """Build the strobe map of a system.
 
-    **Arguments:** system; speed; integration method, by default the classical Runge-Kutta method with 1024 steps,
-    shortened near abrupt changes of the law.
+    **Arguments:** system; speed [rad/s]; integration method, by default the classical Runge-Kutta method with 1024
+    steps, shortened near abrupt changes of the law.
+
+    **Returns:** `StrobeMap`: called with a state, a tuple of scalars [SI], it returns a `Stretch` with the state `y`
+    after one revolution. **Raises:** `ValueError` for an impossible speed, `RuntimeError` without double precision.
     """
     require_x64()
     require_speeds(system, speed)
