@@ -159,7 +159,7 @@ def label_map(
     - `stage`: function called as lanes finish.
     - `settings`: fields of `jaxcage.lanes.Run`; lanes are neither confirmed nor followed to a horizon.
 
-    **Returns:** a data set over x, y and `initial_state` with the variables of `sweep`, and the speed as a coordinate.
+    **Returns:** a data set over x, y and `initial_state`, with the speed as a coordinate.
 
     **Raises:** `ValueError` for arguments that do not fit together; `RuntimeError` without double precision.
     """

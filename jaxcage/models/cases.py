@@ -49,7 +49,7 @@ of a stiffness of the contact its force at a penetration of one clearance may be
 
 
 def case(name: str, constants: str = "identified") -> CageModel:
-    """Build the model of a published case, one of 1a, 1b, 2a, 2b, 3a, 3b (Table 2).
+    """The published case `name`, one of 1a, 1b, 2a, 2b, 3a, 3b (Table 2).
 
     **Arguments:** name; the set of constants that the paper does not print (`jaxcage.models.CONSTANTS`).
 

@@ -220,7 +220,7 @@ DEFAULT_STEPS = 1024
 
 
 def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: float | None = None) -> AbstractMethod:
-    """Make an integration method by name, with fixed or adaptive steps.
+    """Integration method by name, with fixed or adaptive steps.
 
     **Arguments:**
 

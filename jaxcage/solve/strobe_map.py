@@ -34,13 +34,10 @@ class StrobeMap(eqx.Module):
 
 
 def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod | None = None) -> StrobeMap:
-    """Build the strobe map of a system.
+    """Strobe map of `system` at `speed` [rad/s].
 
-    **Arguments:** system; speed [rad/s]; integration method, by default the classical Runge-Kutta method with 1024
-    steps, shortened near abrupt changes of the law.
-
-    **Returns:** `StrobeMap`: called with a state, a tuple of scalars [SI], it returns a `Stretch` with the state `y`
-    after one revolution. **Raises:** `ValueError` for an impossible speed, `RuntimeError` without double precision.
+    **Arguments:** system; speed; integration method, by default the classical Runge-Kutta method with 1024 steps,
+    shortened near abrupt changes of the law.
     """
     require_x64()
     require_speeds(system, speed)
