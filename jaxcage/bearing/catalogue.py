@@ -9,7 +9,7 @@ import dataclasses
 import functools
 from typing import Any, NamedTuple
 
-from .._catalogue import designated, dimensions, estimated, rows
+from .._bearing_data import designated, dimensions, estimated, rows
 from .._errors import ArgumentError
 from .geometry import Bearing
 

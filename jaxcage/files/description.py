@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from .._allowed import ParameterInfo, allowed as must_be, must_be_given, within
-from .._catalogue import CageMaterial, cage_material, designated, estimated
+from .._bearing_data import CageMaterial, cage_material, designated, estimated
 from .._errors import ConfigError
 from .._kinematics import cage_speed_ratio
 from .disk import read_bytes
