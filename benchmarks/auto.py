@@ -12,7 +12,7 @@ import numpy as np
 
 LIBRARY = pathlib.Path("/usr/lib/auto-07p/lib")
 KINDS = {5: "fold", 6: "branch-point", 7: "period-doubling", 8: "Neimark-Sacker"}
-"""What AUTO calls special points of orbits, by number."""
+"""Kinds of special points of orbits, by the numbers that AUTO gives them."""
 CONSTANTS = """dat='start'
 NDIM={dimension}, IPS=2, IRS=0, ILP=1, ICP=[1, 11]
 NTST={intervals}, NCOL=4, IAD=3, ISP=2, ISW=1, IPLT=0

@@ -29,14 +29,14 @@ from tests.reference import WholeBearing
 
 
 SPEEDS, STARTS, REVOLUTIONS, MINUTES = 100, 3, 300, 15.0
-"""What is aimed at."""
+"""Size of the sweep that is aimed at, and its time."""
 ARC = 2 * np.pi / 16
 FINE = 40_000
 """Steps of an arc of the reference."""
 STEPS = (100, 200, 400, 800, 1600)
 """Steps of an arc in C."""
 TOLERANCES = (1e-4, 1e-5, 1e-6)
-"""Of LSODA."""
+"""Tolerances of LSODA."""
 BLOCK = 5
 """Revolutions of a block of the sweep."""
 CHECKED = 3
@@ -88,7 +88,7 @@ def flat(rollers: np.ndarray, bodies: np.ndarray) -> np.ndarray:
 
 
 def pattern(n: int) -> csr_matrix:
-    """Where the rates over time depend on the state: each roller on itself and the bodies, and these on everything."""
+    """Sparsity of the Jacobian: a roller depends on itself and the bodies, a body on everything."""
     size = 5 * n + 10
     found = np.zeros((size, size), dtype=bool)
     for i in range(5):

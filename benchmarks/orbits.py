@@ -46,7 +46,7 @@ class Row:
     special: tuple[tuple[str, float], ...] = ()
     """Kind and place [unit of the task]."""
     errors: tuple[float, ...] = ()
-    """Of each place, as the program says; none where it says nothing."""
+    """Error of each place, as the program states it; empty where it states none."""
     cold: float = float("nan")
     process: float = float("nan")
     warm: float = float("nan")
@@ -196,8 +196,10 @@ def page(lines: list[list[str]], notes: list[str]) -> str:
             "",
             f"Made by `python -m benchmarks.orbits`: {machine(available_cores())}.",
             "Processor seconds; `off` is the largest distance of the special points from AUTO's at its finest mesh.",
-            f"SciPy's derivatives are one-sided difference quotients over {shooting.DISTANCE:g}. They move a period",
-            "doubling by about as much, relative to its speed, and a fold by far less.",
+            f"SciPy's derivatives are central difference quotients over {shooting.DISTANCE:g}.",
+            "AUTO does not report the period doubling of the cage: within one of its steps a complex pair of",
+            "multipliers becomes real and one of them passes -1, while its test function, the distance of the nearest",
+            "multiplier from the unit circle, keeps its sign.",
             "",
             *("| " + " | ".join(cells) + " |" for cells in table),
             "",

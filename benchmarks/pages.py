@@ -14,6 +14,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
@@ -65,14 +66,21 @@ def against_paper(text: str) -> str:
 
 
 def every_kind(text: str) -> str:
-    """The edges of every kind of `experiments.reproduce`."""
+    """The edges of every kind of `experiments.reproduce`, the cases in which they agree, and the numbers of zones."""
     document = json.loads(text)
-    kinds, rows = list(document["summary"]), {}
+    kinds, rows, close = list(document["summary"]), {}, defaultdict(list)
     for edge in document["edges"]:
         key = (edge["case"], edge["edge"], f"{edge['published_rpm']:.0f}")
         rows.setdefault(key, {})[edge["kind"]] = _ours(edge, " {:+.1f} %")
+        if edge["ours_rpm"] is not None and abs(edge["error_percent"]) <= 10:
+            close[edge["edge"], edge["kind"]].append(edge["case"])
     body = [(*key, *(found.get(kind, "none") for kind in kinds)) for key, found in rows.items()]
-    return printed(columns([("case", "edge", "published", *kinds), *body], right=True))
+    names = dict.fromkeys(edge["edge"] for edge in document["edges"])
+    agree = [(name, *(" ".join(close[name, kind]) or "none" for kind in kinds)) for name in names]
+    count = [(zones["case"], *(str(zones[kind]) for kind in ("published", *kinds))) for zones in document["zones"]]
+    shown = [("case", "edge", "published", *kinds), *body], [("within 10 %", *kinds), *agree]
+    each = [*shown, [("zones of 500 rpm and more", "published", *kinds), *count]]
+    return printed("\n\n".join(columns(rows, right=True) for rows in each))
 
 
 README, EDGE, DESIGN, PAPER = "README.md", "docs/edges.md", "docs/design.md", "docs/reproduction.md"

@@ -19,9 +19,8 @@ from scipy.optimize import brentq
 
 
 Rates = Callable[[float, float, np.ndarray], np.ndarray]
-DISTANCE, TOLERANCE = 1e-6, 1e-9
-"""Distance of one-sided difference quotients, and Newton's last step. In the cage the quotients put the period doubling
-at 18089.3562 rpm; central ones over 1e-5, with a tolerance of 1e-12, at 18089.3447 rpm."""
+DISTANCE, TOLERANCE = 1e-5, 1e-9
+"""Distance of central difference quotients, and Newton's last step."""
 SHORTEST, LONGEST = 1e-5, 0.05
 
 
@@ -62,12 +61,12 @@ def history(rates: Rates, state: np.ndarray, samples: int = 400) -> np.ndarray:
 def returned(rates: Rates, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """P(z) - z and its derivative by (z, speed); the neighbours take the same steps, so that their errors cancel."""
     n = u.size - 1
-    around = u + DISTANCE * np.vstack([np.zeros(n + 1), np.eye(n + 1)])
+    around = u + DISTANCE * np.vstack([np.zeros(n + 1), np.eye(n + 1), -np.eye(n + 1)])
     speeds, z = around[:, n], np.ascontiguousarray(around[:, :n])
     field = lambda t, y: np.concatenate([rates(s, t, r) for s, r in zip(speeds, y.reshape(z.shape), strict=True)])
-    found = solve_ivp(field, (0.0, 2 * np.pi), z.ravel(), "DOP853", rtol=1e-10, atol=1e-11)
+    found = solve_ivp(field, (0.0, 2 * np.pi), z.ravel(), "DOP853", rtol=1e-12, atol=1e-13)
     off = found.y[:, -1].reshape(z.shape) - z
-    return off[0], (off[1:] - off[0]).T / DISTANCE
+    return off[0], (off[1 : n + 2] - off[n + 2 :]).T / (2 * DISTANCE)
 
 
 def corrected(rates: Rates, u: np.ndarray, normal: np.ndarray) -> Orbit | None:

@@ -25,9 +25,9 @@ LEAST = 0.01
 """Difference of two exponents that is none."""
 SIGMAS = 3.0
 REVOLUTIONS = 6
-"""Of the reference."""
+"""Revolutions of the reference."""
 SPEEDS = 3
-"""Of a model, at most, beside the reference."""
+"""Largest number of speeds of a model that are compared with the reference."""
 BUDGET = 1e6
 """Evaluations of the reference's field."""
 
@@ -39,7 +39,7 @@ class Beside(NamedTuple):
     ours: np.ndarray
     theirs: np.ndarray
     stated: float
-    """How much ours would change with half as many steps, in all."""
+    """Change of the sum of ours with half as many steps."""
 
     @property
     def apart(self) -> float:

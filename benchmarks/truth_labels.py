@@ -22,7 +22,7 @@ STARTS = 2
 PERTURBED = 36
 """Starts from which the escape rate is measured, where two labels differ."""
 SPREAD = 0.02
-"""How far they are from the model's own [scale]."""
+"""Their distance from the model's own initial state [scale]."""
 SETTLED, LENGTH = 60, 600
 """Revolutions after which escapes count, and those of a default sweep."""
 EXPLAINED = 0.05

@@ -20,7 +20,7 @@ SETTLING = 60
 CERTAIN = 1e-4
 """The reference counts where its integrators agree to this [scale]."""
 ROUNDING = 1e-13
-"""Of a revolution [scale]: no error is below it."""
+"""Rounding error of a revolution [scale]: no error is below it."""
 NOISE = 3.0
 """Its error is not above so many times the difference of its integrators."""
 SHARPER = 100.0

@@ -12,7 +12,7 @@ SOURCES: dict[Kind, str] = {
     "catalogue": "catalogue of the bearing",
     "oil": "data sheet of the oil",
     "operating": "the machine",
-    "unknown": "nobody knows it unless it is measured",
+    "unknown": "not known unless it is measured",
     "fixed": "constant of nature, of a law, or numerical",
 }
 """Kinds of parameters, and where a value comes from."""

@@ -389,17 +389,23 @@ def topics() -> dict[str, tuple[Rows, ...]]:
     }
 
 
+OF_REYNOLDS = (SOMMERFELD, GUEMBEL, CONCENTRIC, FINITE_VOLUMES, LUND_THOMSEN, NICHOLAS, ASYMPTOTE)
+"""Sources of the numbers that the solver in `reynolds` is compared with."""
+
+
 def page(found: dict[str, list[Row]]) -> str:
     """All rows as Markdown."""
     rows = [r for of in found.values() for r in of]
+    reynolds = sum(r.source in OF_REYNOLDS for r in rows)
     lines = [
-        f"# Validation\n\n{sum(r.passed for r in rows)} of {len(rows)} comparisons pass. "
-        f"The numbers were made with jaxcage {jc.__version__} by `python tests/literature.py`.\n",
+        f"# Validation\n\n{sum(r.passed for r in rows)} of {len(rows)} comparisons pass: {len(rows) - reynolds} "
+        f"numbers of jaxcage, and {reynolds} of the solver of\nReynolds' equation in `tests/reynolds.py`, with which "
+        "the tests compare the short film of the package: the rows of long\n"
+        "and concentric films, of full bearings and of grooves. "
+        f"Made with jaxcage {jc.__version__} by `python tests/literature.py`.\n",
         "A tolerance is what the source supports: half a unit of the last printed digit where ours is exact, more",
         "where theirs was computed on a coarse grid or ours is a finite sample. FAILS marks a difference beyond it.",
         "A source is one that can be opened, or a second computation that shares no code with what it is held against.",
-        "In the rows of long and concentric films, of full bearings and of grooves, ours is the solver of Reynolds'",
-        "equation in `tests/reynolds.py`, with which the tests compare the short film of the package.",
     ]
     for topic, of in found.items():
         lines += [f"\n## {topic.capitalize()}\n", "| what | theirs | ours | difference | tolerance | | source |"]
@@ -408,11 +414,11 @@ def page(found: dict[str, list[Row]]) -> str:
 
 
 def _line(r: Row) -> str:
-    """Ours has as many digits as the tolerance asks for, and one more."""
-    digits = 2
-    while digits < 12 and abs(r.ours) * 10.0 ** (1 - digits) > r.tolerance:
+    """Ours has the digits of the difference, ten at most, as theirs."""
+    digits, away = 2, r.ours - r.theirs
+    while digits < 10 and abs(r.ours) * 10.0 ** (2 - digits) > abs(away):
         digits += 1
-    numbers = f"{r.theirs:.10g} | {r.ours:.{digits}g} | {r.ours - r.theirs:+.2g} | {r.tolerance:.2g}"
+    numbers = f"{r.theirs:.10g} | {r.ours:.{digits}g} | {away:+.2g} | {r.tolerance:.2g}"
     return f"| {r.what} | {numbers} | {'pass' if r.passed else '**FAILS**'} | {r.source} |"
 
 

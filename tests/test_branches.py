@@ -105,7 +105,7 @@ class Bend(eqx.Module):
 @pytest.mark.wide
 @pytest.mark.parametrize("start", [-1.3, -1.1, -0.9])
 def test_two_folds_within_a_step(start):
-    """At x = +-sqrt(a/3), 0.04 apart where steps are 0.5: as many multipliers outside on either side, and two folds."""
+    """Two folds at x = ±sqrt(a/3), 0.04 apart with steps of 0.5, leave the number of multipliers outside the same."""
     a = 0.001
     system = jc.ForcedSystem(Bend(**numbers(p=0.0, a=a)), dimension=1)
     orbit = (start,), start**3 - a * start

@@ -112,7 +112,7 @@ def given():
 
 @pytest.mark.parametrize("change", wide_but((0.001, 0.007, 0.02, 0.11), 0.001))
 def test_the_fold_of_a_cage_is_followed(given, change):
-    """At 18686 rpm, onset of the second unstable range: where a search finds it in the changed design."""
+    """The onset of the second unstable range (18686 rpm) is followed to where a search finds it in the new design."""
     assert given.upper.kind == "fold" and float(given.upper.speed_rpm) == pytest.approx(18686.338, abs=1e-2)
     other = jc.replace(CASE, guidance_gap=(1 + change) * GAP)
     found = follow(CASE, given.upper, other, lower=FAR[0], upper=FAR[1])

@@ -95,8 +95,8 @@ def planted(monkeypatch: pytest.MonkeyPatch):
 
 @pytest.mark.parametrize("curvature, errors, most", [(0.0, 2, 34), (0.15, 3, 38)])
 def test_planted_edges_and_elasticities_lie_within_their_errors(planted, curvature: float, errors: int, most: int):
-    """Of 40 seeds some 38 should be within two standard errors, where the law is what is fitted; where its square
-    acts on the design, too, which is not, within three."""
+    """Some 38 of 40 seeds should lie within two standard errors where the fitted law holds, and within three where a
+    square acts on the design that is not fitted."""
     inside, steady = np.zeros(4), 0
     for seed in range(40):
         planted(seed, curvature=curvature)

@@ -240,7 +240,7 @@ def test_crossing_and_its_rate(kind):
 @pytest.mark.parametrize("turn", [0.0, 0.5])
 @pytest.mark.parametrize("angle", [1.7, 0.02, 0.002])
 def test_torus_bifurcation_with_multipliers_close_to_the_real_axis(turn, angle):
-    """Where the pair is close to 1 or -1, exp(i phi) is a poor unknown; the product of the pair is not."""
+    """If the pair is close to 1 or -1, exp(i phi) is a poor unknown, and the product of the pair is not."""
     period = 2 * np.pi / 1.1
     point = point_of("Neimark-Sacker", b=angle / period, turn=turn)
     assert point.status == "converged"

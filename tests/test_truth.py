@@ -1,4 +1,4 @@
-"""What the default method says is so: labels and exponents that were those of the steps once, and errors as stated.
+"""The default method is right: labels and exponents that once depended on the step size, and stated errors.
 
 Every sweep of case 1a and of what differs from it in its numbers runs by the same compiled programs.
 """

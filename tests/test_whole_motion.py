@@ -58,7 +58,7 @@ def run():
 
 @pytest.mark.wide
 def test_energy(run):
-    """What the shaft gives is lost in contacts or stored, over a revolution."""
+    """The energy that the shaft gives in a revolution is lost in contacts or stored."""
     model, start, ran = run
     assert ran.outcome == "successful" and ran.error < 1e-3
     gain = float(energy_and_momentum(model, ran.last)[0] - energy_and_momentum(model, start)[0])

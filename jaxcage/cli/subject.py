@@ -173,7 +173,7 @@ class Subject:
         notes = {
             "Readings": [*filter(None, [jc.show.readings_words(self.model)])],
             "Lines still as `jaxcage init` wrote them (change or delete the comment of one that is yours)": left,
-            "Estimated from other dimensions, as no maker prints them": jc.show.values_words(self.model, estimated),
+            "Estimated, as the file does not give them": jc.show.values_words(self.model, estimated),
             "Best guesses of values known within ranges only": guesses,
         }
         return document, [f"{what}: {', '.join(values)}" for what, values in notes.items() if values]

@@ -94,6 +94,9 @@ def _run(call: functools.partial[Answer]) -> None:
     over = call.keywords.get("over")
     if over is not None and over != inspect.signature(call.func).parameters["over"].default:
         speeds |= {"first": over.first, "last": over.last}
+    operating = call.keywords.get("operating") or getattr(call.keywords.get("calm"), "operating", None)
+    if operating is not None:
+        speeds["operating"] = operating[1]
     check_case(call.keywords["subject"], speeds)
     if "other" in call.keywords:
         check_case(call.keywords["other"], {})

@@ -26,7 +26,7 @@ from ..quantities import notebook_html
 from ..solve import AbstractMethod
 from .bifurcation import PointEquations, Solved, solve_point
 from .continuation import in_parallel
-from .newton import as_root
+from .newton import as_root, expanded
 from .orbit import Orbit, OrbitEquations, sorted_multipliers
 from .point import Kind, Point, Start
 from .problem import MOST_OF_A_POINT, SPEED, Counts, Given, make_problem, with_fallback
@@ -85,13 +85,15 @@ class Sensitivity:
 
 @compiled
 def _pull_back(equations: PointEquations, given: Given, u: Array) -> AbstractForcedSystem:
-    """Return d speed / d system at a bifurcation over speed."""
+    """Return d speed / d system at a bifurcation over speed, the first derivative of `as_root` with less to trace."""
 
-    def speed(system: AbstractForcedSystem) -> Array:
-        moved, _ = as_root(Given(system, given.speed), equations=equations, u=u)
-        return equations.problem.values(moved)[0]
+    def residual(system: AbstractForcedSystem, u: Array) -> Array:
+        return expanded(equations, u, Given(system, given.speed))[0]
 
-    return eqx.filter_grad(speed)(given.system)
+    _, pull = eqx.filter_vjp(residual, given.system, u)
+    jacobian = jax.vmap(lambda row: pull(row)[1])(jnp.eye(u.size))
+    of_speed = jax.grad(lambda u: equations.problem.values(u)[0])(u)
+    return pull(-jnp.linalg.solve(jacobian.T, of_speed))[0]
 
 
 def sensitivity(

@@ -176,16 +176,18 @@ def refined(
 @compiled
 def as_root(given: Any, *, equations: AbstractEquations, u: Float[Array, " n"]) -> tuple[Array, Any]:
     """Return the root u of the equations and the auxiliary results there as differentiable functions of `given`."""
-    problem, start = equations.problem, frozen(u)
-
-    def closing(u: Array) -> tuple[Array, Any]:
-        strobe = problem.prepare(u, given)
-        x = jnp.concatenate([u[: problem.dimension], numbers_of(strobe)[0]])
-        return equations.closing(u, *by_columns(x, Push(frozen(strobe), problem)))
-
+    closing = lambda u: expanded(equations, u, given)
     matrix = lambda linear, y: jnp.linalg.solve(jax.jacfwd(linear)(jnp.zeros_like(y)), y)
-    root = jax.lax.custom_root(lambda u: closing(u)[0], start, lambda _, u: u, matrix)
+    root = jax.lax.custom_root(lambda u: closing(u)[0], frozen(u), lambda _, u: u, matrix)
     return root, closing(root)[1]
+
+
+def expanded(equations: AbstractEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Any]:
+    """Return residual and auxiliary results at the unknowns u as differentiable functions of u and `given`."""
+    problem = equations.problem
+    strobe = problem.prepare(u, given)
+    x = jnp.concatenate([u[: problem.dimension], numbers_of(strobe)[0]])
+    return equations.closing(u, *by_columns(x, Push(frozen(strobe), problem)))
 
 
 def numbers_of(strobe: StrobeMap) -> tuple[Float[Array, " k"], Callable[[Array], StrobeMap]]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .._allowed import SOURCES
-from .._catalogue import designated, estimated
+from .._bearing_data import designated, estimated
 from .._parameters import EXTRA, get, parameter_paths, readings_of, walk
 from ..files import BearingFile, configuration, is_range
 from ..models import AbstractForcedSystem

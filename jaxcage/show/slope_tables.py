@@ -102,15 +102,15 @@ def _with_errors(found: Mapping[str, tuple[float, float]], factor: float = 1.0) 
 
 
 def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int, beside: Beside = None) -> Table:
-    """Table of edges of lasting chaos, and their elasticities."""
+    """Table of edges of lasting chaos, and their elasticities; without numbers where they should not be used."""
     names = next(iter(edges.values())).directions
-    rows = [
-        {"name": each, "speed_rpm": edge.value, "standard_error_rpm": edge.value_error}
-        | chosen(edge, "horizon status")
-        | {"escapes": f"{edge.fit.escapes} of {edge.fit.lanes}"}
-        | _with_errors({n: edge.elasticity_of(*of) for n, of in _asked(names).items()})
-        for each, edge in edges.items()
-    ]
+    rows = []
+    for each, edge in edges.items():
+        row = {"name": each, **chosen(edge, "horizon status"), "escapes": f"{edge.fit.escapes} of {edge.fit.lanes}"}
+        if edge.status == "converged":
+            row |= {"speed_rpm": edge.value, "standard_error_rpm": edge.value_error}
+            row |= _with_errors({n: edge.elasticity_of(*of) for n, of in _asked(names).items()})
+        rows.append(row)
     speed = speed_columns("speed [rpm]", "speed_rpm", beside, "standard_error_rpm")
     columns = [Column("edge", "name"), *speed, *_error_columns(names), "escapes", "status"]
     title = f"Elasticities of the edges of {name} at which the mean life of chaos passes {horizon} revolutions"

@@ -80,7 +80,7 @@ def _zones(title: str, key: str, zones: Sequence[Zone], beside: Beside) -> Table
     columns: list[Column | str] = ["zone"]
     for end in ENDS:
         columns += speed_columns(end, f"{end}_rpm", beside, f"{end}_uncertainty_rpm", nothing="past range")
-    columns.append(Column("share", shown="%", digits=0))
+    columns += [] if key == "unstable_ranges" else [Column("share", shown="%", digits=0)]
     columns += [Column("mean life [revolutions]", "life")] if any(zone.life for zone in zones) else []
     return table(title, rows, columns, key)
 

@@ -20,7 +20,7 @@ STEPS = 512
 """Fewest steps of a revolution."""
 TOLERANCE = 1e-11
 PARTS = 32
-"""Of a revolution, after each of which a tangent is made 1 long again."""
+"""Parts of a revolution, after each of which a tangent is made 1 long again."""
 ESCAPE = 2.0
 """Eccentricity ratio beyond which the cage is outside."""
 STEP = 1e-20

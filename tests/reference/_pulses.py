@@ -21,7 +21,7 @@ class Pulse(NamedTuple):
     force: np.ndarray
     """Q_cw [N]."""
     weight: np.ndarray
-    """Of each node in an integral over time [s]."""
+    """Weight of each node in an integral over time [s]."""
 
 
 def pulse(
@@ -39,7 +39,7 @@ def pulse(
     held = math.sqrt((bar + k * depth ** (1 / 9)) / mass)
 
     def rates(s: float, y: np.ndarray) -> list[float]:
-        """Of the penetration and the bar's position: a bar far out would round off more of the difference of two."""
+        """Rates of the penetration and the bar's position: the difference of two positions would lose digits."""
         q = k * max(y[0] * length, 0.0) ** (10 / 9) * unit / speed
         bent = (q - bar * y[1] * length * unit / speed) / mass
         return [y[2], y[3], -q / roller_mass - bent, bent]

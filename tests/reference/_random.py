@@ -31,9 +31,9 @@ SPANS = {"temperature": (300.0, 390.0)}
 """Beyond its two points the line of viscosity runs off to nothing and to solids."""
 FACTOR = 5.0
 DECADES = 9
-"""What is drawn from a range that begins at zero, or runs through it, lies in so many decades below its end."""
+"""Decades below the end of a range that begins at zero, or runs through it, in which numbers are drawn."""
 SPEEDS = {False: (2500.0, 27500.0), True: (300.0, 60000.0)}
-"""Of narrow and wide models [rpm]."""
+"""Ranges of speed of narrow and wide models [rpm]."""
 
 
 def random_model(seed: int, wide: bool = False) -> CageModel:
