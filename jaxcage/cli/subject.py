@@ -223,7 +223,8 @@ def read_case(given: str) -> Subject:
         name = "".join(c if c.isprintable() and c != "$" else "_" for c in name)
         found = Subject(name, file.model, None, file, given)
     if broken := jc.bearing.design_rule_violations(found.model.bearing, found.model.guidance_gap):
-        if found.file is not None and "bearing.pocket_clearance" in found.file.estimated:
+        estimated = () if found.file is None else found.file.estimated
+        if "bearing.pocket_clearance" in estimated and any("T =" in words for words in broken):
             broken.append("T is estimated: give pocket_clearance below [bearing] if you know it.")
         say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
     for doubt in found.model.lubricant.doubts():

@@ -5,6 +5,8 @@ the coefficient of restitution e by the exact law of this model, ln[(1 + chi)/(1
 exponent: integrate m dv/dt = -K p^n (1 + chi v/v_0) over one contact, entered at v_0 and left at -e v_0.
 """
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import optimistix as optx
@@ -38,7 +40,7 @@ def restitution_damping(restitution: Scalar) -> Array:
     # chi lies between -1/2 and nearly 1/e
     bounds = {"lower": -jnp.log1p(jax.lax.stop_gradient(e) / 2), "upper": jnp.array(60.0)}
     # No check and no derivative of the library: they put host callbacks into programs, which are then not kept on disk.
-    search = dict(options=bounds, max_steps=200, throw=False)
+    search: dict[str, Any] = dict(options=bounds, max_steps=200, throw=False)
     find = lambda defect, start: optx.root_find(lambda s, _: defect(s), solver, start, **search).value
     slope = lambda linear, y: y / linear(jnp.ones_like(y))
     s = jax.lax.custom_root(lambda s: _restitution_defect(s, e), jnp.array(0.5), find, slope)
