@@ -7,7 +7,7 @@
 | `orbit`           | periodic orbits, their multipliers, and the determinant these must have             |
 | `point`           | bifurcation points: kinds, and matrices and functions that vanish there             |
 | `arclength`       | step control of continuation: predictions, accepted and rejected steps              |
-| `continuation`    | pseudo-arclength continuation, an iterator with corrector, step control and events  |
+| `continuation`    | pseudo-arclength continuation, an iterator with step control and events             |
 | `location`        | bifurcations between orbits of a branch, compared with every change of stability    |
 | `branch`          | branches of orbits with their bifurcations                                          |
 | `bifurcation`     | Newton's method for bifurcation points                                              |
@@ -44,7 +44,6 @@ from .orbit import (
     periodic_orbit as periodic_orbit,
 )
 from .point import Point as Point
-from .problem import pick as pick
 from .search import (
     StableRange as StableRange,
     SynchronousOrbits as SynchronousOrbits,

@@ -12,7 +12,7 @@ from .._errors import ArgumentError
 from .._pytrees import Scalar
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
-from ..solve import AbstractMethod, Rodas4
+from ..solve import IMPLICIT, AbstractMethod
 from .arclength import Points, StepControl
 from .continuation import (
     Continuation,
@@ -100,7 +100,7 @@ def branch(
     problem = orbit_curves(Given(system, start.speed), parameter, lower, upper, method, periods)
     at = float(start.at)
     problem.require_inside("orbit", at)
-    if method is None and isinstance(orbit, Orbit) and isinstance(orbit.solver, Rodas4):
+    if method is None and isinstance(orbit, Orbit) and orbit.solver == IMPLICIT:
         problem = problem.by_rodas4()
     (found,) = follow_both_ways(problem, [(np.asarray(start.state), at)], steps)
     if found is None:

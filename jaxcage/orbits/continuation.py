@@ -1,9 +1,9 @@
 """Pseudo-arclength continuation of many curves of solutions at a time, as an iterator over (problem, points).
 
 A curve R(u) = 0 with one more unknown than equations is followed through folds, whether stable or not: the step control
-predicts a point, the corrector finds the point of the curve on the plane through it, and events end the curve. Each of
-the three is an argument of `Continuation`. Every curve has its own step length and number of steps per revolution;
-corrections of all curves run in chunks of one compiled program on all cores.
+predicts a point, the corrector finds the point of the curve on the plane through it, and events end the curve. Every
+curve has its own step length and number of steps per revolution; corrections of all curves run in chunks of one
+compiled program on all cores.
 """
 
 import concurrent.futures
@@ -265,13 +265,11 @@ def first_points(
     return found
 
 
-def solved_again(
-    problem: ContinuationProblem, row: Points, which: np.ndarray, steps: np.ndarray, corrector: Callable = correct
-) -> Points:
+def solved_again(problem: ContinuationProblem, row: Points, which: np.ndarray, steps: np.ndarray) -> Points:
     """Return the points with those at `which` solved for again with other steps, if that succeeds."""
     if not which.size:
         return row
-    got = corrector(problem, row.u[which], row.tangent[which], steps)
+    got = correct(problem, row.u[which], row.tangent[which], steps)
     good = got.converged
     return row.put(which[good], got.take(good).with_errors_of(row.take(which[good])))
 
@@ -324,7 +322,7 @@ class Continuation:
     again, and the step along the curve is repeated. If the error is small the steps per revolution are halved.
 
     **Arguments:** problem, which may be replaced between two steps; first points, each followed in the direction of its
-    tangent; step control; further events; corrector; `oriented`, True if the equations keep their orientation along a
+    tangent; step control; further events; `oriented`, True if the equations keep their orientation along a
     curve, which they do not if the problem is replaced.
     """
 
@@ -334,10 +332,9 @@ class Continuation:
         start: Points,
         control: StepControl,
         events: Sequence[Event] = (),
-        corrector: Callable[..., Points] = correct,
         oriented: bool = True,
     ):
-        self.problem, self.control, self.corrector, self.oriented = problem, control, corrector, oriented
+        self.problem, self.control, self.oriented = problem, control, oriented
         leaves = lambda curve: "" if self.problem.inside(curve.points[-1].u) else "range"
         counts = lambda curve: "steps" if len(curve.points) > control.most else ""
         self.events = (leaves, *events, closes, counts)
@@ -364,7 +361,7 @@ class Continuation:
         changed = [c for c in active if c.steps != c.points[-1].steps]
         if changed:  # solve for the last points again with the present number of steps
             last, steps = Points.stacked([c.points[-1] for c in changed]), np.array([c.steps for c in changed])
-            last = solved_again(self.problem, last, np.arange(len(changed)), steps, self.corrector)
+            last = solved_again(self.problem, last, np.arange(len(changed)), steps)
             for i, c in enumerate(changed):
                 c.points[-1] = last.take(i)
         ahead, normal = (
@@ -372,12 +369,12 @@ class Continuation:
         )
         steps, lengths = (np.array([getattr(c, name) for c in active]) for name in ("steps", "length"))
         closely = np.clip(OF_A_STEP * lengths, 2 * TOLERANCE, FOLLOWING)
-        got = self.corrector(self.problem, ahead, normal, steps, closely, measured=True)
+        got = correct(self.problem, ahead, normal, steps, closely, measured=True)
         unknown = np.flatnonzero(
             self.chooses & got.converged & (steps >= self.most) & ~(got.error <= SETTLED)
         )  # too few steps per revolution, or too large a tolerance of Newton's method
         if unknown.size:
-            closer = self.corrector(self.problem, got.u[unknown], normal[unknown], steps[unknown], measured=True)
+            closer = correct(self.problem, got.u[unknown], normal[unknown], steps[unknown], measured=True)
             got = got.put(unknown, closer)
         return [
             c for i, c in enumerate(active) if self._advances(c, got.take(i), ahead[i], normal[i], bool(i in unknown))

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
-import jax.extend as jex
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
@@ -26,7 +25,7 @@ from jaxtyping import Array, Float, Int
 from .._parameters import Parameter as Parameter, pick as pick
 from .._pytrees import Scalar
 from ..models import AbstractForcedSystem
-from ..solve import REVOLUTION, AbstractMethod, FixedSteps, StrobeMap, method as make_method, strobe_map
+from ..solve import REVOLUTION, AbstractMethod, FixedSteps, StrobeMap, depends, method as make_method, strobe_map
 
 
 SPEED = "speed"
@@ -59,17 +58,6 @@ def value_of(system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> 
 
 def name_of(parameter: Parameter) -> str:
     return parameter if isinstance(parameter, str) else "parameter"
-
-
-def _depends_on_input(f: Callable[[Array], list[Array]], x: Array) -> list[bool]:
-    """Return for each array of f(x) True if it depends on x."""
-    traced = jax.make_jaxpr(f)(x).jaxpr
-    touched = set(traced.invars)
-    reached = lambda v: not isinstance(v, jex.core.Literal) and v in touched
-    for equation in traced.eqns:
-        if any(map(reached, equation.invars)):
-            touched.update(equation.outvars)
-    return list(map(reached, traced.outvars))
 
 
 def frozen(tree: Any) -> Any:
@@ -145,7 +133,7 @@ class OrbitProblem(eqx.Module):
         """Return the derivatives of the field's numbers by the i-th unknown, None for those independent of it."""
         row = lambda x: jax.tree.leaves(eqx.filter(self.prepare(u.at[i].set(x), given).field, eqx.is_inexact_array))
         _, slope = jax.jvp(row, (u[i],), (jnp.ones_like(u[i]),))
-        return [s if d else None for s, d in zip(slope, _depends_on_input(row, u[i]), strict=True)]
+        return [s if d else None for s, d in zip(slope, depends(row, u[i]), strict=True)]
 
     def returned(self, strobe: StrobeMap, z: Float[Array, " dim"], drifts: Sequence[Any] = ()) -> tuple[Array, Array]:
         """Apply the return map, the strobe map `periods` times.

@@ -203,7 +203,7 @@ def engine_of(
             _engines[key] = Engine(system, tangents, several, pair, samples)
         except UnknownOperation as operation:
             say_once(str(operation))
-    return _engines.setdefault(key, JaxEngine(system, tangents, several, samples))
+    return _engines.setdefault(key, JaxEngine(tangents, samples))
 
 
 def has_implicit(system: AbstractForcedSystem) -> bool:
