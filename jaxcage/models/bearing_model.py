@@ -32,8 +32,7 @@ from ..bearing import (
 )
 from ..forces import Land, LandContact, RibFilm
 from .bearing_field import BearingAtSpeed
-from .bearing_history import RollerHistory, bearing_orders, roller_history
-from .bearing_quantities import QUANTITIES
+from .bearing_reports import QUANTITIES, RollerHistory, bearing_orders, roller_history
 from .bearing_states import BESIDE, OF_BODIES, OF_ROLLER, WATCHED, BearingState, Bodies, Rollers
 from .contacts import (
     Guide,

@@ -97,17 +97,12 @@ class Traction(eqx.Module):
                 "peak", said=f"must be above `rest` and `limit`, but is {peak:g} beside {rest:g} and {limit:g}."
             )
 
-    @property
-    def curve(self) -> TractionCurve:
-        """The law whose maximum is `peak`, exactly at `peak_speed`.
+    def at(self, thickness: Scalar = 1.0) -> TractionCurve:
+        """The law in oil whose viscosity is `thickness` times that for which the curve holds, its `viscosity_1`: there
+        its maximum is `peak`, exactly at `peak_speed`.
 
         With w = A + B u_m the slope vanishes at u_m if C = B/w, and the value there is the peak if
         w exp(A/w) = e (peak - limit), whose solution is Lambert's function.
-        """
-        return self.at(1.0)
-
-    def at(self, thickness: Scalar) -> TractionCurve:
-        """The law in oil whose viscosity is `thickness` times that for which the curve holds, its `viscosity_1`.
 
         While the oil in the contact is Newtonian, the slope is eta_p/(p h) with the viscosity eta_p at the mean
         pressure p and the film thickness h (C. R. Evans and K. L. Johnson, Proc. IMechE C 200 (1986) 313). With
