@@ -29,7 +29,7 @@ from ..solve import REVOLUTION, AbstractMethod, FixedSteps, StrobeMap, depends, 
 
 
 SPEED = "speed"
-FIRST, FIRST_OF_RODAS4, MOST = 256, 512, 16384
+FIRST, MOST = {"rk4": 256, "rodas4": 512}, 16384  # least steps of each method, and most of all
 MOST_OF_A_POINT = 2 * MOST  # a bifurcation point by 16384 steps is confirmed by twice as many
 ENOUGH = 4096  # most steps of a computation that only provides a guess
 GIVEN_UP = 2048  # if this many steps find nothing, more are not tried
@@ -204,23 +204,16 @@ class Counts(NamedTuple):
         return float(self.tolerance) > 0
 
 
-def counted(
-    method: AbstractMethod | None, most: int = MOST, solver: str = "rk4", first: int = FIRST
-) -> tuple[AbstractMethod, Counts]:
+def counted(method: AbstractMethod | None, most: int = MOST, solver: str = "rk4") -> tuple[AbstractMethod, Counts]:
     """Return a method with its number of steps left open, and the numbers to try: half the method's own number and that
-    number or, without a method, as many as are needed."""
-    chosen, begin, last = make_method(solver) if method is None else method, first, most
+    number or, without a method, as many of `solver` as are needed."""
+    chosen, begin, last = make_method(solver) if method is None else method, FIRST[solver], most
     if not isinstance(chosen, FixedSteps):
         begin, last = 1, 1
     elif method is not None:
         begin, last = jnp.maximum(chosen.steps // 2, 1), chosen.steps
     counts = Counts(jnp.asarray(begin, int), jnp.asarray(last, int), jnp.asarray(float(method is None)))
     return by_steps(chosen, 1), counts
-
-
-def by_rodas4(most: int = MOST) -> tuple[AbstractMethod, Counts]:
-    """Return Rodas4 with its number of steps left open, and the numbers to try."""
-    return counted(None, most, "rodas4", FIRST_OF_RODAS4)
 
 
 T = TypeVar("T", bound=eqx.Module)
@@ -243,4 +236,4 @@ def with_fallback(
     found = find(*counted(method, most))
     if method is not None or isinstance(good := serves(found), Tracer) or bool(good):
         return found
-    return find(*by_rodas4(most))
+    return find(*counted(None, most, "rodas4"))
