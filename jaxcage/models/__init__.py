@@ -26,7 +26,11 @@ from .bearing_model import (
     state_scale as state_scale,
     whole_bearing as whole_bearing,
 )
-from .bearing_reports import RollerHistory as RollerHistory
+from .bearing_reports import (
+    RollerHistory as RollerHistory,
+    bearing_orders as bearing_orders,
+    roller_history as roller_history,
+)
 from .bearing_states import (
     BESIDE as BESIDE,
     INTEGRATED as INTEGRATED,
