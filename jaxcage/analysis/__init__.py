@@ -36,7 +36,6 @@ from .measures import (
 )
 from .rollers import (
     Around as Around,
-    NamedLine as NamedLine,
     RollerHistory as RollerHistory,
     around as around,
     bearing_spectra as bearing_spectra,
