@@ -44,23 +44,10 @@ from .bearing_states import (
     bodies_of as bodies_of,
     rollers_of as rollers_of,
 )
-from .cage import (
-    FORCES as FORCES,
-    NEEDED as NEEDED,
-    CageModel as CageModel,
-    fastest_speed as fastest_speed,
-)
-from .cage_quantities import (
-    CAGE_QUANTITIES as CAGE_QUANTITIES,
-    CageHistory as CageHistory,
-    cage_values as cage_values,
-)
+from .cage import FORCES as FORCES, NEEDED as NEEDED, CageModel as CageModel
+from .cage_quantities import CAGE_QUANTITIES as CAGE_QUANTITIES, CageHistory as CageHistory, cage_values as cage_values
 from .cases import case as case
-from .contacts import (
-    Pockets as Pockets,
-    Raceways as Raceways,
-    Traction as Traction,
-)
+from .contacts import Pockets as Pockets, Raceways as Raceways, Traction as Traction
 from .field import (
     AbstractField as AbstractField,
     FirstOrderField as FirstOrderField,
@@ -81,5 +68,5 @@ from .protocol import (
 
 check_layer(
     globals(),
-    "case fastest_speed rolling_start whole_bearing",
+    "case rolling_start whole_bearing",
 )

@@ -34,14 +34,7 @@ from ..forces import Land, LandContact, RibFilm
 from .bearing_field import BearingAtSpeed
 from .bearing_reports import QUANTITIES
 from .bearing_states import BESIDE, OF_BODIES, OF_ROLLER, WATCHED, BearingState, Bodies, Rollers
-from .contacts import (
-    Guide,
-    Pockets,
-    RacewayConstants,
-    Raceways,
-    RollerDrag,
-    Traction,
-)
+from .contacts import Guide, Pockets, RacewayConstants, Raceways, RollerDrag, Traction
 from .protocol import AbstractForcedSystem, StepLimits
 
 

@@ -34,7 +34,7 @@ from ..forces import (
 )
 from ..quantities import component_names
 from .field import AbstractField, SecondOrderField
-from .protocol import FASTEST, AbstractForcedSystem, told
+from .protocol import AbstractForcedSystem, told
 
 
 ClearanceReading = Literal["as_printed", "radial"]
@@ -300,8 +300,3 @@ def _worst(length: Scalar | Array, clearance: Scalar | Array) -> tuple[float, fl
     lengths, rooms = np.broadcast_arrays(np.asarray(length), np.asarray(clearance))
     most = int(np.argmax(lengths / rooms))
     return float(lengths.ravel()[most]), float(rooms.ravel()[most])
-
-
-def fastest_speed(model: CageModel) -> float:
-    """The speed [rad/s] at which the land of the slowest of the cages in `model` runs at `FASTEST`."""
-    return FASTEST / float(np.max(np.asarray(model.land_radius)))

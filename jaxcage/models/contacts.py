@@ -24,16 +24,7 @@ from .._errors import ArgumentError
 from .._parameters import choice, parameter
 from .._pytrees import Scalar
 from ..bearing import LOAD_POWER, STARVATION
-from ..forces import (
-    ContactForce,
-    FilmForce,
-    Land,
-    Motion,
-    contact_force,
-    inverse_root,
-    power_10_9,
-    smooth_plus,
-)
+from ..forces import ContactForce, FilmForce, Land, Motion, contact_force, inverse_root, power_10_9, smooth_plus
 
 
 class Raceways(eqx.Module):

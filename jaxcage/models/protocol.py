@@ -16,7 +16,7 @@ import numpy as np
 
 from .._arguments import is_concrete
 from .._errors import ArgumentError, InputError
-from .._kinematics import FASTEST as FASTEST
+from .._kinematics import FASTEST
 from .._pytrees import Scalar, State
 from ..quantities import Quantity
 from .field import AbstractField

@@ -20,17 +20,8 @@
 from .._arguments import check_layer
 from .arclength import StepControl as StepControl
 from .bifurcation import bifurcation as bifurcation
-from .branch import (
-    Branch as Branch,
-    branch as branch,
-)
-from .curves import (
-    Curve as Curve,
-    Followed as Followed,
-    curve as curve,
-    follow as follow,
-    follow_all as follow_all,
-)
+from .branch import Branch as Branch, branch as branch
+from .curves import Curve as Curve, Followed as Followed, curve as curve, follow as follow, follow_all as follow_all
 from .gradient import (
     OrbitSlopes as OrbitSlopes,
     Sensitivity as Sensitivity,
@@ -39,10 +30,7 @@ from .gradient import (
     sensitivity as sensitivity,
     width as width,
 )
-from .orbit import (
-    Orbit as Orbit,
-    periodic_orbit as periodic_orbit,
-)
+from .orbit import Orbit as Orbit, periodic_orbit as periodic_orbit
 from .point import Point as Point
 from .search import (
     StableRange as StableRange,

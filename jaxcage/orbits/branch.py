@@ -14,14 +14,7 @@ from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import IMPLICIT, AbstractMethod
 from .arclength import Points, StepControl
-from .continuation import (
-    Continuation,
-    ContinuationProblem,
-    Event,
-    Path,
-    Start,
-    orbit_curves,
-)
+from .continuation import Continuation, ContinuationProblem, Event, Path, Start, orbit_curves
 from .location import Place, bifurcations_of
 from .orbit import NearOrbit, Orbit
 from .point import UNEXPLAINED, Outcome, Point, read_start
