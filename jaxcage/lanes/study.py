@@ -99,12 +99,7 @@ def _chunk(about: Study, number: int, progress: Progress) -> Results:
     return {name: values[name] for name in about.variables}
 
 
-def run_study(
-    about: Study,
-    path: str | Path,
-    shard: Shard = (1, 1),
-    progress: Progress | None = None,
-) -> None:
+def run_study(about: Study, path: str | Path, shard: Shard = (1, 1), progress: Progress | None = None) -> None:
     """Compute the pending chunks of the store at `path`; arguments as for `study`."""
     i, n = shard
     if not 1 <= i <= n:

@@ -66,7 +66,4 @@ from .protocol import (
 )
 
 
-check_layer(
-    globals(),
-    "case rolling_start whole_bearing",
-)
+check_layer(globals(), "case rolling_start whole_bearing")

@@ -242,10 +242,7 @@ class CageModel(AbstractForcedSystem):
         """The cage's force laws at `speed` [rad/s]."""
         named, extra, c = [law for law in self.forces if law.law_name], self.extra, self.clearance
         arm = effective_eccentricity(self.unbalance, self.eccentricity, self.guidance_gap, self.printed_unit)
-        own = {
-            "unbalance": UnbalanceForce(self.cage_mass * arm),
-            "weight": WeightForce(self.cage_mass * self.gravity),
-        }
+        own = {"unbalance": UnbalanceForce(self.cage_mass * arm), "weight": WeightForce(self.cage_mass * self.gravity)}
         laws = (*(law.at(self, speed) for law in named), *own.values(), *(law.at(self, speed) for law in extra))
         names = (*(law.law_name for law in named), *own, *(type(law).__name__ for law in extra))
         land = Land(c, 1 / c, self.contact.onset, self.contact.smoothing / c, self.film.smoothing / c)

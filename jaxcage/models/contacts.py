@@ -165,11 +165,7 @@ class RollerDrag(eqx.Module):
     """Drag, churning and rolling resistance of rollers, none by default; `bearing.oil_drag` has the laws."""
 
     drag_coefficient: Scalar = parameter(
-        "1",
-        0.0,
-        10.0,
-        "drag coefficient C_d of a roller's centre; with `cylinder` times a cylinder's",
-        default=0.0,
+        "1", 0.0, 10.0, "drag coefficient C_d of a roller's centre; with `cylinder` times a cylinder's", default=0.0
     )
     churning_coefficient: Scalar = parameter("1", 0.0, 10.0, "churning coefficient C_n of its spin", default=0.0)
     oil_share: Scalar = parameter("1", 0.0, 1.0, "share of oil in the volume between the rings", default=0.02)
@@ -270,13 +266,7 @@ class PocketForces(NamedTuple):
 
 
 def pocket_contact(
-    model: Any,
-    out: Scalar,
-    along: Scalar,
-    v_out: Scalar,
-    v_along: Scalar,
-    spin: Scalar,
-    cage_speed: Scalar,
+    model: Any, out: Scalar, along: Scalar, v_out: Scalar, v_along: Scalar, spin: Scalar, cage_speed: Scalar
 ) -> PocketForces:
     """The bars on a roller.
 

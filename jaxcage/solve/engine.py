@@ -317,11 +317,7 @@ def _scale_and_excursion(system: AbstractForcedSystem, speed: Array, y: Array) -
 
 
 def histories(
-    lanes: Lanes,
-    y0: Float[np.ndarray, "lanes dim"],
-    samples: int,
-    revolutions: int,
-    method: AbstractMethod,
+    lanes: Lanes, y0: Float[np.ndarray, "lanes dim"], samples: int, revolutions: int, method: AbstractMethod
 ) -> tuple[Float[np.ndarray, "lanes samples dim"], Float[np.ndarray, " lanes"]]:
     """States of lanes [SI] at `samples` phases of each of `revolutions`, and the largest error of a revolution [scale].
 
