@@ -130,8 +130,7 @@ Stage = Callable[[str, int, int], None]
 
 def label_map(
     model: AbstractForcedSystem,
-    x: Mapping[str, Float[np.ndarray, " x"]],
-    y: Mapping[str, Float[np.ndarray, " y"]],
+    vary: Mapping[str, Float[np.ndarray, " values"]],
     *,
     initial_states: int = 1,
     persist: int = 0,
@@ -143,24 +142,19 @@ def label_map(
     **Arguments:**
 
     - `model`: a cage, a whole bearing or a system of your own.
-    - `x`, `y`: name and ascending values [SI] of one parameter each, one of them `"speed"`.
+    - `vary`: names and ascending values [SI] of the two, `"speed"` and a parameter.
     - `initial_states`: number of the model's own initial states to run at each point.
     - `persist`: revolutions that chaos must outlast: lanes found chaotic are run again with this many revolutions
         discarded, so that chaotic transients that end earlier get another label. 0 turns this off.
     - `stage`: function called as lanes finish.
     - `settings`: fields of `jaxcage.lanes.Run`; lanes are neither confirmed nor followed to a horizon.
 
-    **Returns:** a data set over x, y and `initial_state`.
+    **Returns:** a data set over both and `initial_state`.
 
     **Raises:** `ValueError` for arguments that do not fit together.
     """
     require_x64()
-    (x_name, x_value), (y_name, y_value) = (*x.items(), *y.items())
-    if min(len(x_value), len(y_value)) < 2:
-        raise ArgumentError(
-            "x", "y", said=f"must have at least 2 values each, but have {len(x_value)}, {len(y_value)}."
-        )
-    grid = Grid({x_name: x_value, y_name: y_value}, {}, 0, 0, initial_states)
+    grid = Grid(vary, {}, 0, 0, initial_states)
     grid.require_known(model)
     run = Run.of(model, **{"keep": CLOSING, **settings, "confirm": False, "horizon": 0})
     require_at_least(0, persist=persist)
