@@ -9,7 +9,6 @@
 | `loop`        | the integration loop: lanes, step control, strobe states, growth of tangent vectors     |
 | `fields`      | a model's programs for that loop; the whole bearing as a loop over its rollers          |
 | `engine`      | the engine of a model; lanes, each a design at a speed; histories                       |
-| `jax_engine`  | the engine inside JAX, for methods and laws without machine code                        |
 | `method`      | methods by name: machine code, a fixed number of steps, or adaptive steps               |
 | `kernel`      | a step of a method as a scalar function                                                 |
 | `march`       | equal steps inside JAX's programs: lanes, tangents, derivatives of any order            |
@@ -23,6 +22,7 @@ from .engine import (
     SURE as SURE,
     WIDTH as WIDTH,
     Engine as Engine,
+    JaxEngine as JaxEngine,
     Lanes as Lanes,
     cores as cores,
     engine_of as engine_of,
@@ -30,7 +30,6 @@ from .engine import (
     histories as histories,
 )
 from .ir import say_once as say_once
-from .jax_engine import JaxEngine as JaxEngine
 from .kernel import REVOLUTION as REVOLUTION, rosenbrock_step as rosenbrock_step
 from .march import march as march
 from .method import (
