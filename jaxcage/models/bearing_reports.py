@@ -1,7 +1,7 @@
-"""What a whole bearing reports: quantities from integrals over a run, and forces on every roller along a time history.
+"""Quantities that a whole bearing reports from integrals over a run, and forces on every roller along a time history.
 
-Quantities are slips, forces, losses, wear and whirl. Samples of a history are states; the forces at them are worked out
-again by the laws that moved them.
+The quantities are slips, forces, losses, wear and whirl. Samples of a history are states; the forces at them are worked
+out again by the laws that moved them.
 """
 
 import dataclasses
