@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxcage as jc
+from tests.helpers import preliminary
 
 
 CASE = "1a"
@@ -53,7 +54,7 @@ def make_problem(lanes: int) -> Problem:
     more lanes than asked for those inside are kept.
     """
     _begin()
-    model = jc.case(CASE, "preliminary")
+    model = preliminary(CASE)
     speeds = jc.rpm(FIRST_RPM, LAST_RPM, lanes + lanes // 64 + 8)
     table = jax.vmap(lambda s: jnp.stack([jnp.stack(y) for y in model.initial_states(s)]))
     initial_states = np.asarray(table(jnp.asarray(speeds)))
@@ -75,7 +76,7 @@ def load(file: str) -> Problem:
     """The lanes that `save` kept."""
     _begin()
     with np.load(file) as kept:
-        return Problem(jc.case(CASE, "preliminary"), kept["speeds"], kept["states"])
+        return Problem(preliminary(CASE), kept["speeds"], kept["states"])
 
 
 def spread_out(problem: Problem, lanes: int) -> Problem:

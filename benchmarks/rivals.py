@@ -231,7 +231,6 @@ def all_rivals() -> list[Rival]:
         *[Jaxcage(f"{NATIVE}{name}", f"{NATIVE}{name}", TOLERANCES, 1e-10) for name in PAIRS],
         Jaxcage("rk4", "rk4", (256, 384, 512), 8192),
         Jaxcage("rodas4", "rodas4", (256, 320, 448), 8192),
-        Jaxcage("rodas4 adaptive", "rodas4", (1e-4, 1e-5), 1e-9),
         Jaxcage("tsit5 adaptive", "tsit5", (1e-4, 1e-5), 1e-10),
         Diffrax("Kvaerno3", (1e-4, 3e-5, 1e-5, 1e-6), 1e-9, 512, 2),
         Diffrax("Kvaerno5", (1e-3, 3e-4, 1e-4, 1e-5), 1e-9, 512, 2),

@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 
 import jaxcage as jc
-from jaxcage.models import CageModel, fastest_speed
+from jaxcage._kinematics import FASTEST
+from jaxcage.models import CageModel
 from jaxcage.solve import AbstractMethod, native
 from tests import reference
 
@@ -24,6 +25,11 @@ GRID = 8
 """Speeds of each model."""
 FEW = 3
 """Speeds of each model with `--quick`."""
+
+
+def fastest_speed(model: CageModel) -> float:
+    """The speed [rad/s] at which the land of the cage runs as fast as is allowed."""
+    return FASTEST / float(model.land_radius)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -160,7 +160,7 @@ class Ledger:
         for stage in reversed(STAGES):
             if rows := self.of(stage.name):
                 return {u.name: float(rows[0][u.name]) for u in self.unknowns}
-        known = jc.parameters(jc.case("1a", "identified"))
+        known = jc.parameters(jc.case("1a"))
         known["cubic_ratio"] = known["cubic_stiffness"] * known["guidance_gap"] ** 2 / known["stiffness_x"]
         return {u.name: float(known[u.target]) for u in self.unknowns}
 
@@ -284,7 +284,7 @@ def main() -> None:
     given = parser.parse_args()
     jc.keep_compiled_programs()
     read = dict(each.split("=", 1) for each in given.read)
-    models = {name: jc.replace(jc.case(name, "identified"), **read) for name in given.cases}
+    models = {name: jc.replace(jc.case(name), **read) for name in given.cases}
     relative = read.get("support.cubic") == "dimensionless"
     unknowns = tuple(RELATIVE if relative and u.name == "cubic_stiffness" else u for u in UNKNOWNS)
     ledger = Ledger(given.ledger, unknowns)

@@ -44,7 +44,7 @@ class Quantity:
     shown_in: str = ""
     """Display unit; empty for the SI unit."""
     of: Callable[[Any], Any] | None = None
-    """Function that computes it from `Averages`, or from the model's result for a time history."""
+    """Function that computes it from `Averages`."""
     overall: Literal["whole", "mean"] = "whole"
     """Value of a run: from averages over the whole run, or the mean over its blocks."""
 

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from helpers import followed, made_sweep
+from helpers import followed, made_sweep, preliminary
 
 import jaxcage as jc
 from experiments.reproduce import Runs, compare_edges, conclusions_on_zones, reproduction, run_all
@@ -59,7 +59,7 @@ def by_hand(zones, speeds=8):
 
 @pytest.fixture(scope="module")
 def runs():
-    models = {name: jc.case(name, "preliminary") for name in PUBLISHED_CASES}
+    models = {name: preliminary(name) for name in PUBLISHED_CASES}
     return run_all(models, speeds=26, discard=40, revolutions=40, orbits=False)
 
 

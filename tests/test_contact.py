@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import preliminary
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
@@ -66,7 +67,7 @@ def test_weak_restitution_is_delivered(restitution):
 def test_land_contact_of_the_cage_delivers_restitution():
     """Through `CageModel`: the regularised onset costs of the order of its share of the depth."""
     small = {"contact.smoothing": 1e-9}
-    model = jc.replace(jc.case("1a", "preliminary"), restitution=0.5, approach_speed=0.2, **small)
+    model = jc.replace(preliminary("1a"), restitution=0.5, approach_speed=0.2, **small)
     cage = model.cage_at(1000.0)
     c, onset = float(model.clearance), float(model.contact.onset)
 

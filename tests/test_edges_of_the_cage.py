@@ -6,14 +6,14 @@ Newton's method finds them again.
 
 import numpy as np
 import pytest
-from helpers import edge_speed, in_other_units, wide_but
+from helpers import edge_speed, in_other_units, preliminary, wide_but
 
 import jaxcage as jc
 from jaxcage import parameter_info
 from jaxcage.orbits import Point, sensitivity, width
 
 
-CASE = jc.case("1a", "preliminary")
+CASE = preliminary("1a")
 STATES = {
     "Neimark-Sacker": (11023.07, (1.33877e-5, -5.11828e-5, 0.520974, 0.0221109)),
     "period-doubling": (12266.09, (1.43798e-5, -8.77557e-5, 0.437277, 0.0136768)),

@@ -12,6 +12,7 @@ import equinox as eqx
 import jax
 import numpy as np
 import pytest
+from helpers import preliminary
 from scipy.optimize import brentq
 from short_bearing import (
     LARGEST_WHIRLING,
@@ -25,7 +26,6 @@ from short_bearing import (
 from jaxcage import replace
 from jaxcage.analysis import measures
 from jaxcage.forces import RibFilm, film_scale
-from jaxcage.models import case
 from jaxcage.solve import simulate
 
 
@@ -116,7 +116,7 @@ def test_eigenvalues_cross_the_axis_at_rouths_threshold(eps):
 def cage_in_film(film, **changes):
     """A cage in its film alone, without unbalance."""
     names = ("stiffness_x", "stiffness_y", "damping", "cubic_stiffness", "cross_stiffness", "eccentricity", "amplitude")
-    model = replace(case("1a", "preliminary"), **(dict.fromkeys(names, 0.0) | changes))
+    model = replace(preliminary("1a"), **(dict.fromkeys(names, 0.0) | changes))
     return eqx.tree_at(lambda m: m.film, model, RibFilm(model.film.land_width, model=film))
 
 

@@ -6,13 +6,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import xarray as xr
-from helpers import even, raw_sweep, wide_but
+from helpers import even, preliminary, raw_sweep, wide_but
 
 import jaxcage as jc
 from jaxcage.analysis import chaotic_share, failed, summary, too_short
 
 
-MODEL = jc.case("1a", "preliminary")
+MODEL = preliminary("1a")
 RPM = np.pi / 30
 C = 0.45e-3
 HEALTHY = (0.4 * C, 0.3 * C, 0.0, 0.0)

@@ -6,13 +6,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import preliminary
 from reynolds import film_force
 from scipy.integrate import quad
 from short_bearing import short_film_force as force
 
 from jaxcage import replace
 from jaxcage.forces import arc_centre, film_drive, film_resistance, half_circle_resistance
-from jaxcage.models import case
 
 
 MODELS = "fixed_half", "positive_pressure", "full"
@@ -184,7 +184,7 @@ def test_supply_pressure_pushes_with_its_projected_area(model, state):
 
 
 def test_supply_pressure_in_the_cage_is_2_R_L_p0_for_each_land():
-    model = case("1a", "preliminary")
+    model = preliminary("1a")
     pressed = replace(model, supply_pressure=3e4)
     point = 1e-4, -0.5e-4, 0.01, 0.02
     film, plain = (m.cage_at(900.0).forces(0.0, *point)["film"][:2] for m in (pressed, model))
@@ -195,7 +195,7 @@ def test_supply_pressure_in_the_cage_is_2_R_L_p0_for_each_land():
 
 
 def with_film(name):
-    return replace(case("1a", "preliminary"), **{"film.model": name})
+    return replace(preliminary("1a"), **{"film.model": name})
 
 
 EPS = np.linspace(0.0, 1.5, 1501)

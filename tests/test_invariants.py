@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import beyond_range, elastic, in_other_units, wide_but
+from helpers import beyond_range, elastic, in_other_units, preliminary, wide_but
 from hypothesis import assume, given, settings, strategies as st
 from scipy.integrate import simpson
 
@@ -17,7 +17,7 @@ from jaxcage.models import FORCES
 from jaxcage.solve.kernel import Pieces
 
 
-CASE = jc.case("1a", "preliminary")
+CASE = preliminary("1a")
 RANGES = {
     "cage_mass": (0.1, 0.5),
     "guidance_gap": (2e-4, 8e-4),

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from helpers import cage_sweep, read_columns
+from helpers import cage_sweep, preliminary, read_columns
 
 import jaxcage as jc
 from jaxcage.files import check_writable, configuration, model_from
@@ -20,7 +20,7 @@ def test_round_trip(tmp_path: Path):
 
 
 def test_labels_units_and_configuration_are_stored(tmp_path: Path):
-    model = jc.replace(jc.case("2b", "preliminary"), guidance_gap=0.5e-3)
+    model = jc.replace(preliminary("2b"), guidance_gap=0.5e-3)
     sweep = jc.sweep(model, jc.rpm(8000, 8400, 2), discard=4, revolutions=16, blocks=4, confirm=False, horizon=0)
     stored = xr.open_zarr(save(tmp_path / "sweep.zarr", sweep), consolidated=False, chunks=None)
     assert stored["strobe"].dims == ("speed", "initial_state", "revolution", "component")

@@ -249,7 +249,7 @@ def test_map_of_a_system_agrees_with_a_sweep():
     make = lambda force: jc.ForcedOscillator(Ueda(jnp.array(force)), coordinates=1)
     speeds, forces = np.linspace(0.9, 1.4, 9), np.linspace(4.0, 8.0, 8)
     length = dict(discard=60, revolutions=60, blocks=6, method=jc.method("rodas4", steps=32))
-    found = jc.label_map(make(7.5), {"speed": speeds}, {"force": forces}, initial_states=2, **length)
+    found = jc.label_map(make(7.5), {"speed": speeds, "force": forces}, initial_states=2, **length)
     initial_states = [tuple(float(c) for c in s) for s in make(7.5).initial_states(1.0)[:2]]
     same, near = 0, 0
     for j in (0, 7):

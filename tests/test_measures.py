@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from helpers import preliminary
 
 import jaxcage as jc
 from jaxcage.analysis import cage_forces, measures
-from jaxcage.models import case
 from jaxcage.models.cage_quantities import winding
 
 
@@ -41,7 +41,7 @@ def trajectory(tau, state, speed: float | np.ndarray = SPEED, samples=64, peak=0
 @pytest.mark.parametrize("ratio", [1.0, 0.5, -0.25])
 @pytest.mark.parametrize("centre", [(0.0, 0.0), (2e-5, -3e-5)])
 def test_circular_orbit(ratio, centre):
-    m = measures(case("1a", "preliminary"), orbit(ratio=ratio, centre=centre))
+    m = measures(preliminary("1a"), orbit(ratio=ratio, centre=centre))
     assert m.value("whirl_ratio") == pytest.approx(ratio, rel=1e-9)
     assert m.value("rms") == pytest.approx(1e-4, rel=1e-9)
     assert m.value("peak_displacement") == pytest.approx(1e-4, rel=1e-9)
@@ -50,7 +50,7 @@ def test_circular_orbit(ratio, centre):
 
 def test_ellipse_and_its_velocity_scatter():
     """rms^2 = (a^2 + b^2)/2; |v| = a w sqrt(sin^2 + k^2 cos^2) with k = b/a."""
-    m = measures(case("1a", "preliminary"), orbit(flatten=0.5, samples=256))
+    m = measures(preliminary("1a"), orbit(flatten=0.5, samples=256))
     assert m.value("rms") == pytest.approx(1e-4 * np.sqrt(1.25 / 2), rel=1e-9)
     assert m.value("whirl_ratio") == pytest.approx(1.0, abs=1e-3)
     a = np.linspace(0, 2 * np.pi, 100001)[:-1]
@@ -62,14 +62,14 @@ def test_ellipse_and_its_velocity_scatter():
 @pytest.mark.parametrize("peak, eps", [(0.0, 0.5), (0.8, 0.8), (1.1, 1.1)])
 def test_film_thickness_uses_the_largest_eps_of_any_step(peak, eps):
     run = dataclasses.replace(orbit(radius=0.5 * GAP), peak=peak)
-    m = measures(case("1a", "preliminary"), run)
+    m = measures(preliminary("1a"), run)
     assert m.value("largest_eps") == pytest.approx(eps)
     assert m.value("minimum_film_thickness") == pytest.approx(max(GAP * (1 - eps), 0.0), abs=1e-18)
 
 
 def test_synchronous_impact_and_its_impulse():
     """A |sin tau|: peak A, impulse 4 A/omega in a revolution."""
-    m = measures(case("1a", "preliminary"), orbit(samples=256))
+    m = measures(preliminary("1a"), orbit(samples=256))
     assert m.value("peak_impact_force") == pytest.approx(109.9051, rel=1e-12)
     assert m.value("impact_impulse") == pytest.approx(4 * 109.9051 / SPEED, rel=1e-4)
     assert m.value("peak_contact_force") == 0.0 and m.value("contact_impulse") == 0.0
@@ -77,7 +77,7 @@ def test_synchronous_impact_and_its_impulse():
 
 def test_steady_contact_force_and_its_impulse():
     """Whirl at a constant penetration of 0.01 c: K p^(10/9), no damping at restitution 1."""
-    model = case("1a", "preliminary")
+    model = preliminary("1a")
     m = measures(model, orbit(radius=0.98 * GAP))
     expected = 68992.2 / GAP ** (10 / 9) * (0.01 * GAP) ** (10 / 9)
     assert m.value("peak_contact_force") == pytest.approx(expected, rel=1e-3)
@@ -87,7 +87,7 @@ def test_steady_contact_force_and_its_impulse():
 
 @pytest.mark.parametrize("eps, kept", [(0.0, 0.0), (0.5, 0.5), (0.99, 0.97)])
 def test_drag_power_is_that_of_the_sheared_film(eps, kept):
-    model = case("1a", "preliminary")
+    model = preliminary("1a")
     radius, width, viscosity = (92.1e-3 - GAP) / 2, 4.2679e-3, 870 * 56e-6
     one = 2 * np.pi * viscosity * SPEED**2 * radius**3 * width / (GAP * np.sqrt(1 - kept**2))
     m = measures(model, orbit(radius=eps * GAP))
@@ -97,7 +97,7 @@ def test_drag_power_is_that_of_the_sheared_film(eps, kept):
 @pytest.mark.wide
 def test_forces_of_a_simulation_are_its_acceleration():
     """M r'' from the recorded velocities, by a spectral derivative of a synchronous orbit."""
-    model, speed = case("1a", "preliminary"), 16000 * np.pi / 30
+    model, speed = preliminary("1a"), 16000 * np.pi / 30
     run = jc.simulate(model, speed, revolutions=1, discard=400, samples=128, method=jc.method("rk4", steps=512))
     spectrum = np.fft.rfft(run.state[:, 2:], axis=0)
     order = np.arange(len(spectrum))[:, None]
@@ -110,7 +110,7 @@ def test_forces_of_a_simulation_are_its_acceleration():
 @pytest.mark.wide
 def test_energy_balance_of_a_synchronous_orbit():
     """On a closed orbit the impacts and the unbalance put in what film and support take out."""
-    model, speed = case("1a", "preliminary"), 16000 * np.pi / 30
+    model, speed = preliminary("1a"), 16000 * np.pi / 30
     run = jc.simulate(model, speed, revolutions=4, discard=400, samples=128)
     forces, velocity = cage_forces(model, run), run.state[:, 2:]
     power = {name: float(np.mean(np.sum(f * velocity, axis=1))) for name, f in forces.items()}
@@ -124,7 +124,7 @@ def test_energy_balance_of_a_synchronous_orbit():
 
 def test_whirl_that_cannot_be_told_is_none():
     """To and fro through the mean centre, or by less than the run's error; a hundred circles with one such pass can."""
-    model, circle = case("1a", "preliminary"), orbit(samples=64)
+    model, circle = preliminary("1a"), orbit(samples=64)
     for error, samples in ((np.nan, 63), (1e-8, 64)):
         line = dataclasses.replace(orbit(flatten=1e-9, samples=samples), error=error)
         assert np.isnan(measures(model, line).value("whirl_ratio"))

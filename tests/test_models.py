@@ -13,15 +13,15 @@ from jaxcage import parameters
 
 
 MODELS = {
-    "rigid": lambda: jc.case("2a", "preliminary"),
-    "elastic": lambda: helpers.elastic(jc.case("1b", "preliminary")),
-    "roller-pass": lambda: helpers.roller_pass(jc.case("3b", "preliminary")),
+    "rigid": lambda: helpers.preliminary("2a"),
+    "elastic": lambda: helpers.elastic(helpers.preliminary("1b")),
+    "roller-pass": lambda: helpers.roller_pass(helpers.preliminary("3b")),
     "dimensionless cubic": lambda: jc.replace(
-        jc.case("1a", "preliminary"), cubic_ratio=50.0, **{"support.cubic": "dimensionless"}
+        helpers.preliminary("1a"), cubic_ratio=50.0, **{"support.cubic": "dimensionless"}
     ),
-    "printed unbalance": lambda: jc.replace(jc.case("1a", "preliminary"), unbalance="as_printed"),
-    "positive pressure": lambda: jc.replace(jc.case("1a", "preliminary"), **{"film.model": "positive_pressure"}),
-    "restitution": lambda: jc.replace(jc.case("1a", "preliminary"), restitution=0.5),
+    "printed unbalance": lambda: jc.replace(helpers.preliminary("1a"), unbalance="as_printed"),
+    "positive pressure": lambda: jc.replace(helpers.preliminary("1a"), **{"film.model": "positive_pressure"}),
+    "restitution": lambda: jc.replace(helpers.preliminary("1a"), restitution=0.5),
 }
 METHOD = jc.method("rodas4", steps=64)
 
@@ -89,7 +89,7 @@ def test_strobe_map_derivatives_match_finite_differences(name: str):
 @pytest.mark.wide
 def test_stiff_heavy_rib_is_the_rigid_rib():
     """Same cage, rib on a spring of 1e10 N/m: the strobe state agrees to the rib's static deflection."""
-    model, speed = jc.case("1a", "preliminary"), jnp.asarray(1500.0)
+    model, speed = helpers.preliminary("1a"), jnp.asarray(1500.0)
     held = helpers.elastic(model, mass=50.0, stiffness=1e13, damping=1e5)
     rigid, moving = revolve(model, speed, state(model, 1500.0)), revolve(held, speed, state(held, 1500.0))
     cage = np.asarray(moving)[[0, 1, 4, 5]]
@@ -105,7 +105,7 @@ def test_whirl_threshold_in_the_time_domain(film: str, share: float, grows: bool
     """A rigid cage in its film under gravity alone, held at eps = 0.5: omega sqrt(c/g) = 2.5417 at the threshold, whirl
     at 0.5146 omega there (Routh on the short-bearing coefficients)."""
     eps, load_number, attitude, threshold = 0.5, 0.750381081812, np.deg2rad(53.68020060), 2.54170
-    base = jc.replace(helpers.unforced(jc.case("1a", "preliminary")), **{"film.model": film})
+    base = jc.replace(helpers.unforced(helpers.preliminary("1a")), **{"film.model": film})
     c, g = float(base.clearance), float(base.gravity)
     speed = share * threshold * np.sqrt(g / c)
     weight = float(base.cage_mass) * g

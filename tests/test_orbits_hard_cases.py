@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import preliminary
 from laws import numbers
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
@@ -277,7 +278,7 @@ def test_what_is_not_found_or_cannot_be_asked_for():
 def test_multipliers_of_a_cage_in_contact_are_trusted(unbalance, sizes):
     """The rim is pressed, or just grazed. One multiplier is below 1e-17 of the largest: the determinant is lost to
     rounding, the others are not; the known sizes are those of 4096 steps."""
-    model = jc.case("1a", "preliminary")
+    model = preliminary("1a")
     model = jc.replace(model, eccentricity=unbalance * jc.parameters(model)["eccentricity"])
     orbit = jc.periodic_orbit(model, jc.rpm(20000.0), revolutions=300)
     np.testing.assert_allclose(jnp.abs(orbit.multipliers[:3]), sizes, rtol=2e-3)

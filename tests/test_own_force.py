@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import reference
-from helpers import edge_speed, raw_sweep
+from helpers import edge_speed, preliminary, raw_sweep
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
@@ -54,7 +54,7 @@ class Shaker(AbstractForcing):
         return self.amplitude * jnp.cos(self.times * motion.phase), 0.0, 0.0
 
 
-CASE = jc.case("1a", "preliminary")
+CASE = preliminary("1a")
 SHARE = 1.5
 """Damping [N s/m] that the drag takes over from the support."""
 OWN = jc.replace(CASE, damping=CASE.support.damping - SHARE, extra=(ViscousDrag(SHARE, arm=0.05),))

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import preliminary
 from scipy.integrate import solve_ivp
 from scipy.special import gamma
 
@@ -27,7 +28,7 @@ POINTS = np.random.default_rng(7).normal(scale=2e-4, size=(5, 2))
 
 
 def cage_with(speed=900.0, **parts):
-    model = jc.replace(jc.case("1a", "preliminary"), **parts)
+    model = jc.replace(preliminary("1a"), **parts)
     return model, model.cage_at(speed)
 
 

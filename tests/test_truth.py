@@ -13,9 +13,9 @@ from helpers import beyond_range
 
 import jaxcage as jc
 from benchmarks import truth, truth_exponents
+from benchmarks.truth_models import fastest_speed
 from jaxcage.analysis import failed
 from jaxcage.files import model_from, template
-from jaxcage.models import fastest_speed
 
 
 MODEL = jc.case("1a")

@@ -181,13 +181,13 @@ def test_derivatives_by_every_parameter():
 def test_traction_curve(values):
     """Two printed solutions; coefficients of the second implementation; the peak is where and what it should be."""
     law = Traction(*values)
-    found, expected = law.curve, gupta(*values)
+    found, expected = law.at(), gupta(*values)
     np.testing.assert_allclose([found.a, found.b, found.c, found.d], expected, rtol=1e-9)
     printed = {0.0: (0.101781, 1.547272), 0.01: (0.496374, 1.960504)}
     if values[0] in printed:
         np.testing.assert_allclose([found.b, found.c], printed[values[0]], atol=6e-7)
-    kappa = jax.jit(lambda u: law.curve(u) - 0.0)
-    sharp = jax.jit(lambda u: eqx.tree_at(lambda x: x.traction_smoothing, law, jnp.asarray(1e-9)).curve(u))
+    kappa = jax.jit(lambda u: law.at()(u) - 0.0)
+    sharp = jax.jit(lambda u: eqx.tree_at(lambda x: x.traction_smoothing, law, jnp.asarray(1e-9)).at()(u))
     assert float(sharp(values[3])) == pytest.approx(values[1], rel=1e-12)
     assert float(jax.grad(sharp)(values[3])) == pytest.approx(0.0, abs=1e-12)
     assert float(kappa(-0.37)) == -float(kappa(0.37))

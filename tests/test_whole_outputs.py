@@ -15,7 +15,7 @@ from jaxcage.analysis import (
     measures,
     named_lines,
 )
-from jaxcage.models import rolling_start
+from jaxcage.models import bearing_orders, roller_history, rolling_start
 
 
 pytestmark = pytest.mark.wide
@@ -28,7 +28,7 @@ def run():
     model = bearing()
     start = rolling_start(model, SPEED, cage=1)
     ran = jc.simulate(model, SPEED, revolutions=2, samples=SAMPLES, start=start)
-    return model, ran, model.roller_history(ran)
+    return model, ran, roller_history(model, ran)
 
 
 def test_pocket_forces_are_those_of_the_second_implementation(run):
@@ -101,7 +101,7 @@ def beginning(found, n):
 
 def test_orders_of_rolling_and_names_of_lines(run):
     model, ran, history = run
-    orders = model.known_orders(ran)
+    orders = bearing_orders(model, ran)
     rolling = 1 / 0.401037
     assert orders["inner ring"] == pytest.approx(rolling, rel=0.03)
     assert orders["roller pass, outer ring"] == 13

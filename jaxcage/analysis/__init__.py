@@ -3,8 +3,7 @@
 | module        | responsibility                                                                       |
 |---------------|--------------------------------------------------------------------------------------|
 | `labels`      | periodic, chaotic, quasi-periodic, undecided or failed; the motion of a cage's centre |
-| `survival`    | times at which lanes left chaos for good; its mean life, with an error               |
-| `hazard`      | the escape rate as a function of speed and design                                    |
+| `survival`    | times at which lanes left chaos; its mean life; escape rate by speed and design       |
 | `sweep`       | results of a sweep at each speed                                                     |
 | `zones`       | zones and both kinds of edge; stretches of speed with the same labels                |
 | `spectra`     | amplitude spectra by order of speed                                                  |
@@ -14,20 +13,17 @@
 """
 
 from .._arguments import check_layer
-from .hazard import Hazard as Hazard, hazard as hazard
 from .labels import (
     CHAOS_THRESHOLD as CHAOS_THRESHOLD,
     CLOSING_TOLERANCE as CLOSING_TOLERANCE,
     LABELS as LABELS,
     LONGEST_PERIOD as LONGEST_PERIOD,
-    MOTIONS as MOTIONS,
     closing_period as closing_period,
     decay as decay,
     label_lanes as label_lanes,
     motion_label as motion_label,
     on_torus as on_torus,
     scatter as scatter,
-    too_few_revolutions as too_few_revolutions,
 )
 from .loads import LAND_LOADS as LAND_LOADS, land_loads as land_loads, land_reading as land_reading, motions as motions
 from .measures import (
@@ -35,13 +31,11 @@ from .measures import (
     Measured as Measured,
     Measures as Measures,
     cage_forces as cage_forces,
-    cage_history as cage_history,
     largest_forces as largest_forces,
     measures as measures,
 )
 from .rollers import (
     Around as Around,
-    NamedLine as NamedLine,
     RollerHistory as RollerHistory,
     around as around,
     bearing_spectra as bearing_spectra,
@@ -56,15 +50,16 @@ from .spectra import (
 )
 from .survival import (
     CONFIRM as CONFIRM,
+    Hazard as Hazard,
     Survival as Survival,
     calm_at_the_end as calm_at_the_end,
     calm_threshold as calm_threshold,
     escape_times as escape_times,
+    hazard as hazard,
     survival as survival,
 )
 from .sweep import (
     LIFE_BLOCK as LIFE_BLOCK,
-    UNKNOWN as UNKNOWN,
     chaotic_share as chaotic_share,
     cure as cure,
     failed as failed,
@@ -92,7 +87,4 @@ from .zones import (
 )
 
 
-check_layer(
-    globals(),
-    "around cage_forces measures survival zones",
-)
+check_layer(globals(), "around cage_forces measures survival zones")

@@ -22,9 +22,6 @@ CHAOS_THRESHOLD = 0.02
 """Exponent per revolution that chaos must exceed by two standard errors."""
 TORUS_THRESHOLD = 0.005
 """Largest modulus of an exponent per revolution, and of two standard errors of it, that count as zero."""
-FEWEST_REVOLUTIONS = 20
-"""Smallest number of revolutions for a usable standard error of an exponent: with fewer, one error bar in forty is
-three times too small (256 lanes of Ueda's oscillator)."""
 RANK_TOLERANCE = 1e-3
 """Smallest singular value, relative to the largest, that is kept in the linear model of a strobe orbit."""
 
@@ -153,12 +150,6 @@ def on_torus(
         factor, error = decay(states[lane])
         found[lane] = abs(factor - 1) <= error < np.inf
     return found
-
-
-def too_few_revolutions(label: Shaped[np.ndarray, "*lanes"], revolutions: int) -> Bool[np.ndarray, "*lanes"]:
-    """True for lanes that are undecided, or labelled by an exponent with too few revolutions for its standard error."""
-    by_exponent = np.isin(label, ("quasi-periodic", "chaotic"))
-    return (label == "undecided") | (by_exponent & (revolutions < FEWEST_REVOLUTIONS))
 
 
 def revolutions_to_decide(

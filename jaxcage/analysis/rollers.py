@@ -84,20 +84,11 @@ def bearing_spectra(history: RollerHistory) -> dict[str, OrderSpectrum]:
     return {name: spectrum_of(signal, history.samples) for name, signal in signals.items()}
 
 
-@dataclasses.dataclass(frozen=True)
-class NamedLine:
-    """A line of a spectrum, with the name of the bearing frequency within one bin of it, if there is one."""
-
-    order: float
-    amplitude: float
-    name: str | None
-
-
-def named_lines(spectrum: OrderSpectrum, orders: Mapping[str, float], count: int = LINES) -> list[NamedLine]:
+def named_lines(spectrum: OrderSpectrum, orders: Mapping[str, float], count: int = LINES) -> list[Peak]:
     """Largest lines of a spectrum, in descending order, with names from `orders`."""
 
     def name(peak: Peak) -> str | None:
         nearest = min(orders, key=lambda k: abs(orders[k] - peak.order))
         return nearest if abs(orders[nearest] - peak.order) <= spectrum.resolution else None
 
-    return [NamedLine(p.order, p.amplitude, name(p)) for p in dominant_orders(spectrum, count)]
+    return [peak._replace(name=name(peak)) for peak in dominant_orders(spectrum, count)]

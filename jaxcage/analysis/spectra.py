@@ -15,6 +15,8 @@ class Peak(NamedTuple):
 
     order: float
     amplitude: float
+    name: str | None = None
+    """Name of the bearing frequency within one bin of it, if there is one."""
 
 
 @dataclasses.dataclass(frozen=True)

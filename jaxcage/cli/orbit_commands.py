@@ -305,8 +305,8 @@ def mapped(
 ) -> Answer:
     """Answer on a map over speeds [rad/s] and a parameter: simulated points, with edges that are followed on top."""
     y, title = axis.name, f"{subject.name} over speed and {axis.words}"
-    grid = {"speed": np.linspace(*ends, points[0])}, {y: np.linspace(axis.lower, axis.upper, points[1])}
-    found = jc.label_map(subject.model, *grid, **settings, stage=report)
+    grid = {"speed": np.linspace(*ends, points[0]), y: np.linspace(axis.lower, axis.upper, points[1])}
+    found = jc.label_map(subject.model, grid, **settings, stage=report)
     jc.show.require_some(found)
     curves, lost = jc.show.follow_edges(subject.model, edges, ends, axis, settings.get("method"), report)
     files = {"figure": jc.show.map_figure(axis, curves, found, title), "data": found}

@@ -5,9 +5,8 @@
 | `settings` | length, accuracy and results of a run                                           |
 | `plan`     | designs, speeds and initial states of the lanes                                 |
 | `observe`  | integration of lanes, with what is observed and its errors                      |
-| `confirm`  | confirmation of labels with smaller steps                                       |
 | `horizon`  | continuation of lanes until they settle                                         |
-| `run`      | from plan and settings to a data set; sweeps over speed                         |
+| `run`      | from plan and settings to a data set; confirmation of labels; sweeps            |
 | `dataset`  | the data set with units, texts and provenance; zarr                             |
 | `ramps`    | run-up and run-down                                                             |
 | `grid`     | grids and samples of parameters, in chunks                                      |

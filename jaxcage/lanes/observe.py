@@ -183,19 +183,16 @@ class _Observer:
         """Observe some lanes by one method."""
         run, model, y0 = self.run, self.model, self.states[some]
         count, dim, samples, end = some.size, model.dimension, model.samples, run.discard + run.revolutions
-        scale, excursion = self.lanes.begin(some, y0)
-        outcome = np.where(excursion <= self.limit, 0, OUTSIDE)
-        outcome = np.where(np.all(np.isfinite(y0), axis=1), outcome, NOT_FINITE)
-        nan = lambda *shape: np.full((count, *shape), np.nan)
         state = self.lanes.completed(y0)
-        units = np.concatenate([scale, np.ones((count, state.shape[1] - dim))], axis=1)
-        state = state / units
-        step, error = nan(), np.zeros(count)
+        units, excursion = self.lanes.begin(some, state)
+        scale, state = units[:, :dim], state / units
+        found = Observation.pending(model, run, count)
+        outcome, error, steps, peak = found.outcome, found.error, found.steps, found.peak
+        outcome[:] = np.where(excursion <= self.limit, 0, OUTSIDE)
+        outcome[~np.all(np.isfinite(y0), axis=1)] = NOT_FINITE
+        error[:] = steps[:] = found.doubt[:] = 0.0
+        step, growth = np.full(count, np.nan), np.full((count, run.followed * run.block, run.exponents), np.nan)
         tangents = np.tile(start_tangents(dim, run.exponents), (count, 1, 1))
-        growth, strobe, peak = nan(run.followed * run.block, run.exponents), nan(run.keep, dim), nan()
-        integrals, largest = nan(run.blocks, len(model.beside)), nan(run.blocks, len(model.watched) - 1)
-        place = nan(run.revolutions * samples if self.averages else 0, 2)
-        steps, doubt = np.zeros(count), np.zeros((count, run.exponents))
         alive = np.flatnonzero(outcome == 0)
         for begin, stop, pushed in self._segments():
             alive = alive[outcome[alive] == 0]
@@ -227,24 +224,22 @@ class _Observer:
             steps[alive] += ran.steps / (stop - begin) * (stop - max(begin, run.discard)) / run.revolutions
             if self.averages:
                 block = (begin - run.discard) // run.block
-                integrals[alive, block] = ran.state[:, dim:] - before[:, dim:]
-                largest[alive, block] = ran.peaks[..., 1:].max(axis=1)
+                found.integrals[alive, block] = ran.state[:, dim:] - before[:, dim:]
+                found.largest[alive, block] = ran.peaks[..., 1:].max(axis=1)
                 peak[alive] = np.fmax(peak[alive], ran.peaks[..., -1].max(axis=1))
                 recorded = ran.strobe[..., :dim] * scale[alive, None, :]
-                place[alive, block * strobes : (block + 1) * strobes] = self.lanes.each(_centres, some[alive], recorded)
+                part = slice(block * strobes, (block + 1) * strobes)
+                found.place[alive, part] = self.lanes.each(_centres, some[alive], recorded)
                 continue
-            strobe[alive] = ran.strobe[:, held - run.keep :]
+            found.strobe[alive] = ran.strobe[:, held - run.keep :] * scale[alive, None, :]
             peak[alive] = np.maximum(ran.peak, begun)
-            doubt[alive] = self._doubt(engine, numbers, ran, method)
+            found.doubt[alive] = self._doubt(engine, numbers, ran, method)
             if held > 1:
                 last_ones = ran.strobe[:, -(CHECKED + 1) :]
                 error[alive] = np.maximum(error[alive], self._error(plain, some[alive], last_ones, method))
-        blocks = growth.reshape(count, run.followed, run.block, run.exponents).mean(axis=2)
-        last = np.where((outcome == 0)[:, None], state[:, :dim] * scale, np.nan)
-        kept = strobe * scale[:, None, :]
-        return Observation(
-            outcome.astype(np.int32), last, kept, blocks, peak, error, doubt, steps, integrals, largest, place
-        )
+        found.growth[:] = growth.reshape(count, run.followed, run.block, run.exponents).mean(axis=2)
+        found.last[outcome == 0] = (state[:, :dim] * scale)[outcome == 0]
+        return found
 
     @staticmethod
     def _doubt(

@@ -75,8 +75,8 @@ class Plan:
 
         **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, and states that do not fit.
         """
-        models, speed = _models(designs), checked_speeds(speeds)
-        require_speeds(models[0], speed, "speeds")
+        models = _models(designs)
+        speed = _checked_speeds(models[0], speeds)
         begin = np.stack([states_at(model, speed, states) for model in models])
         shape = begin.shape[:3]
         which, at = (np.repeat(x.ravel(), shape[2]) for x in np.indices(shape[:2]))
@@ -102,14 +102,12 @@ class Plan:
         return self.lanes.begin(np.arange(len(self.states)), self.states)[0]
 
 
-def checked_speeds(speeds: Any) -> Float[np.ndarray, " speeds"]:
+def _checked_speeds(model: AbstractForcedSystem, speeds: Any) -> Float[np.ndarray, " speeds"]:
     """Speeds as an array. **Raises:** `ValueError` for speeds that are empty, not positive, or not ascending."""
     speed = np.atleast_1d(np.asarray(speeds, dtype=float))
     if speed.size == 0:
         raise ArgumentError("speeds", said="must hold at least one speed, but it is empty.")
-    if not np.all(np.isfinite(speed)) or np.any(speed <= 0):
-        bad = speed[~(np.isfinite(speed) & (speed > 0))][0]
-        raise ArgumentError("speeds", said=f"must be positive and finite, but it holds {bad} rad/s.")
+    require_speeds(model, speed, "speeds")
     if np.any(np.diff(speed) <= 0):
         raise ArgumentError("speeds", said="must be in ascending order without repetition, but it is not.")
     return speed

@@ -16,11 +16,10 @@ from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError, Stop
 from ..analysis import LONGEST_PERIOD, scatter
 from ..files import Range
-from ..models import AbstractForcedSystem, require_speeds
+from ..models import AbstractForcedSystem
 from .dataset import coded
 from .grid import LANES, Grid
 from .observe import Progress
-from .plan import SPEED
 from .run import run_lanes
 from .settings import Run
 from .store import Results, Store, Study, open_study
@@ -101,12 +100,7 @@ def _chunk(about: Study, number: int, progress: Progress) -> Results:
     return {name: values[name] for name in about.variables}
 
 
-def run_study(
-    about: Study,
-    path: str | Path,
-    shard: Shard = (1, 1),
-    progress: Progress | None = None,
-) -> None:
+def run_study(about: Study, path: str | Path, shard: Shard = (1, 1), progress: Progress | None = None) -> None:
     """Compute the pending chunks of the store at `path`; arguments as for `study`."""
     i, n = shard
     if not 1 <= i <= n:
@@ -137,42 +131,31 @@ Stage = Callable[[str, int, int], None]
 
 def label_map(
     model: AbstractForcedSystem,
-    x: Mapping[str, Float[np.ndarray, " x"]],
-    y: Mapping[str, Float[np.ndarray, " y"]],
+    vary: Mapping[str, Float[np.ndarray, " values"]],
     *,
-    speed: float | None = None,
     initial_states: int = 1,
     persist: int = 0,
     stage: Stage | None = None,
     **settings: Any,
 ) -> xr.Dataset:
-    """Compute labels and exponents over two parameters.
+    """Compute labels and exponents over the speed and a second parameter.
 
     **Arguments:**
 
     - `model`: a cage, a whole bearing or a system of your own.
-    - `x`, `y`: name and ascending values [SI] of one parameter each, which may be `"speed"`.
-    - `speed`: speed [rad/s], if it is neither of them.
+    - `vary`: names and ascending values [SI] of the two, `"speed"` and a parameter.
     - `initial_states`: number of the model's own initial states to run at each point.
     - `persist`: revolutions that chaos must outlast: lanes found chaotic are run again with this many revolutions
         discarded, so that chaotic transients that end earlier get another label. 0 turns this off.
     - `stage`: function called as lanes finish.
     - `settings`: fields of `jaxcage.lanes.Run`; lanes are neither confirmed nor followed to a horizon.
 
-    **Returns:** a data set over x, y and `initial_state`, with the speed as a coordinate.
+    **Returns:** a data set over both and `initial_state`.
 
     **Raises:** `ValueError` for arguments that do not fit together; `RuntimeError` without double precision.
     """
     require_x64()
-    (x_name, x_value), (y_name, y_value) = (*x.items(), *y.items())
-    if speed is not None:
-        require_speeds(model, speed)
-    if min(len(x_value), len(y_value)) < 2:
-        raise ArgumentError(
-            "x", "y", said=f"must have at least 2 values each, but have {len(x_value)}, {len(y_value)}."
-        )
-    fixed = {} if speed is None else {SPEED: np.array([speed])}
-    grid = Grid({x_name: x_value, y_name: y_value, **fixed}, {}, 0, 0, initial_states)
+    grid = Grid(vary, {}, 0, 0, initial_states)
     grid.require_known(model)
     run = Run.of(model, **{"keep": CLOSING, **settings, "confirm": False, "horizon": 0})
     require_at_least(0, persist=persist)
@@ -189,4 +172,4 @@ def label_map(
         later = run_lanes(grid.plan(model, again), longer, say(f"{again.size} chaotic lanes again"))
         for name, all_lanes in found.data_vars.items():
             all_lanes.values.reshape(grid.size, *all_lanes.shape[len(grid.shape) :])[again] = later[name].values
-    return found if speed is None else found.isel({SPEED: 0})
+    return found

@@ -5,20 +5,18 @@
 | `protocol`   | the model protocol                                                              |
 | `field`      | dy/dtau at one speed, its linearisation, elimination of positions               |
 | `cage`       | the cage in its rib: parameters, and forces at one speed                        |
-| `cases`      | the paper's six cases as models, constants that it does not print               |
+| `cases`      | the paper's six cases as models                                                 |
 | `oscillator` | systems from a user's function, of first or second order                        |
 | `bearing_model` | the whole bearing: parameters, initial states, magnitudes, ready-made bearings |
 | `bearing_states` | its state, and the quantities beside it                                       |
 | `bearing_field` | its equations of motion at one shaft speed                                     |
-| `bearing_history` | forces on every roller along a time history                                  |
-| `bearing_quantities` | quantities that it reports                                                |
+| `bearing_reports` | its quantities, and the forces on every roller along a time history           |
 | `contacts`   | its contacts: raceways, pockets, guiding land, oil                              |
 | `cage_quantities` | quantities that a cage reports of a time history                           |
 """
 
 from .._arguments import check_layer
 from .bearing_field import MOVING as MOVING, BearingAtSpeed as BearingAtSpeed, Passed as Passed
-from .bearing_history import RollerHistory as RollerHistory
 from .bearing_model import (
     WHOLE_BEARINGS as WHOLE_BEARINGS,
     BearingModel as BearingModel,
@@ -28,34 +26,28 @@ from .bearing_model import (
     state_scale as state_scale,
     whole_bearing as whole_bearing,
 )
+from .bearing_reports import (
+    RollerHistory as RollerHistory,
+    bearing_orders as bearing_orders,
+    roller_history as roller_history,
+)
 from .bearing_states import (
     BESIDE as BESIDE,
     INTEGRATED as INTEGRATED,
     LEDGER as LEDGER,
-    MEANS as MEANS,
     OF_BODIES as OF_BODIES,
     OF_ROLLER as OF_ROLLER,
     WATCHED as WATCHED,
     BearingState as BearingState,
     Bodies as Bodies,
-    Rates as Rates,
     Rollers as Rollers,
     bodies_of as bodies_of,
     rollers_of as rollers_of,
 )
-from .cage import (
-    FORCES as FORCES,
-    NEEDED as NEEDED,
-    CageModel as CageModel,
-    fastest_speed as fastest_speed,
-)
-from .cage_quantities import CAGE_QUANTITIES as CAGE_QUANTITIES, CageHistory as CageHistory
-from .cases import CONSTANTS as CONSTANTS, case as case
-from .contacts import (
-    Pockets as Pockets,
-    Raceways as Raceways,
-    Traction as Traction,
-)
+from .cage import FORCES as FORCES, NEEDED as NEEDED, CageModel as CageModel
+from .cage_quantities import CAGE_QUANTITIES as CAGE_QUANTITIES, CageHistory as CageHistory, cage_values as cage_values
+from .cases import case as case
+from .contacts import Pockets as Pockets, Raceways as Raceways, Traction as Traction
 from .field import (
     AbstractField as AbstractField,
     FirstOrderField as FirstOrderField,
@@ -67,7 +59,6 @@ from .field import (
 from .oscillator import ForcedOscillator as ForcedOscillator, ForcedSystem as ForcedSystem
 from .protocol import (
     ESCAPE as ESCAPE,
-    FASTEST as FASTEST,
     INSTEAD as INSTEAD,
     AbstractForcedSystem as AbstractForcedSystem,
     require_known as require_known,
@@ -75,7 +66,4 @@ from .protocol import (
 )
 
 
-check_layer(
-    globals(),
-    "case fastest_speed rolling_start whole_bearing",
-)
+check_layer(globals(), "case rolling_start whole_bearing")

@@ -32,17 +32,9 @@ from ..bearing import (
 )
 from ..forces import Land, LandContact, RibFilm
 from .bearing_field import BearingAtSpeed
-from .bearing_history import RollerHistory, bearing_orders, roller_history
-from .bearing_quantities import QUANTITIES
+from .bearing_reports import QUANTITIES
 from .bearing_states import BESIDE, OF_BODIES, OF_ROLLER, WATCHED, BearingState, Bodies, Rollers
-from .contacts import (
-    Guide,
-    Pockets,
-    RacewayConstants,
-    Raceways,
-    RollerDrag,
-    Traction,
-)
+from .contacts import Guide, Pockets, RacewayConstants, Raceways, RollerDrag, Traction
 from .protocol import AbstractForcedSystem, StepLimits
 
 
@@ -234,12 +226,6 @@ class BearingModel(AbstractForcedSystem):
         scale = state_scale(self, speed)
         turned = PERIODS * TURN * scale.rollers[2, 0] / scale.rollers[3, 0] * jnp.abs(self.rolling_cage_speed(speed))
         return jnp.clip(SPACING / turned, 1.0, SLOWEST)
-
-    def roller_history(self, run: Any) -> RollerHistory:
-        return roller_history(self, run)
-
-    def known_orders(self, run: Any) -> dict[str, float]:
-        return bearing_orders(self, run)
 
     def comparable(self, speed: float) -> float:
         """Angle of the cage [rad] over which two runs can be compared.

@@ -34,7 +34,7 @@ from ..forces import (
 )
 from ..quantities import component_names
 from .field import AbstractField, SecondOrderField
-from .protocol import FASTEST, AbstractForcedSystem, told
+from .protocol import AbstractForcedSystem, told
 
 
 ClearanceReading = Literal["as_printed", "radial"]
@@ -242,10 +242,7 @@ class CageModel(AbstractForcedSystem):
         """The cage's force laws at `speed` [rad/s]."""
         named, extra, c = [law for law in self.forces if law.law_name], self.extra, self.clearance
         arm = effective_eccentricity(self.unbalance, self.eccentricity, self.guidance_gap, self.printed_unit)
-        own = {
-            "unbalance": UnbalanceForce(self.cage_mass * arm),
-            "weight": WeightForce(self.cage_mass * self.gravity),
-        }
+        own = {"unbalance": UnbalanceForce(self.cage_mass * arm), "weight": WeightForce(self.cage_mass * self.gravity)}
         laws = (*(law.at(self, speed) for law in named), *own.values(), *(law.at(self, speed) for law in extra))
         names = (*(law.law_name for law in named), *own, *(type(law).__name__ for law in extra))
         land = Land(c, 1 / c, self.contact.onset, self.contact.smoothing / c, self.film.smoothing / c)
@@ -300,8 +297,3 @@ def _worst(length: Scalar | Array, clearance: Scalar | Array) -> tuple[float, fl
     lengths, rooms = np.broadcast_arrays(np.asarray(length), np.asarray(clearance))
     most = int(np.argmax(lengths / rooms))
     return float(lengths.ravel()[most]), float(rooms.ravel()[most])
-
-
-def fastest_speed(model: CageModel) -> float:
-    """The speed [rad/s] at which the land of the slowest of the cages in `model` runs at `FASTEST`."""
-    return FASTEST / float(np.max(np.asarray(model.land_radius)))

@@ -24,16 +24,7 @@ from .._errors import ArgumentError
 from .._parameters import choice, parameter
 from .._pytrees import Scalar
 from ..bearing import LOAD_POWER, STARVATION
-from ..forces import (
-    ContactForce,
-    FilmForce,
-    Land,
-    Motion,
-    contact_force,
-    inverse_root,
-    power_10_9,
-    smooth_plus,
-)
+from ..forces import ContactForce, FilmForce, Land, Motion, contact_force, inverse_root, power_10_9, smooth_plus
 
 
 class Raceways(eqx.Module):
@@ -97,17 +88,12 @@ class Traction(eqx.Module):
                 "peak", said=f"must be above `rest` and `limit`, but is {peak:g} beside {rest:g} and {limit:g}."
             )
 
-    @property
-    def curve(self) -> TractionCurve:
-        """The law whose maximum is `peak`, exactly at `peak_speed`.
+    def at(self, thickness: Scalar = 1.0) -> TractionCurve:
+        """The law in oil whose viscosity is `thickness` times that for which the curve holds, its `viscosity_1`: there
+        its maximum is `peak`, exactly at `peak_speed`.
 
         With w = A + B u_m the slope vanishes at u_m if C = B/w, and the value there is the peak if
         w exp(A/w) = e (peak - limit), whose solution is Lambert's function.
-        """
-        return self.at(1.0)
-
-    def at(self, thickness: Scalar) -> TractionCurve:
-        """The law in oil whose viscosity is `thickness` times that for which the curve holds, its `viscosity_1`.
 
         While the oil in the contact is Newtonian, the slope is eta_p/(p h) with the viscosity eta_p at the mean
         pressure p and the film thickness h (C. R. Evans and K. L. Johnson, Proc. IMechE C 200 (1986) 313). With
@@ -179,11 +165,7 @@ class RollerDrag(eqx.Module):
     """Drag, churning and rolling resistance of rollers, none by default; `bearing.oil_drag` has the laws."""
 
     drag_coefficient: Scalar = parameter(
-        "1",
-        0.0,
-        10.0,
-        "drag coefficient C_d of a roller's centre; with `cylinder` times a cylinder's",
-        default=0.0,
+        "1", 0.0, 10.0, "drag coefficient C_d of a roller's centre; with `cylinder` times a cylinder's", default=0.0
     )
     churning_coefficient: Scalar = parameter("1", 0.0, 10.0, "churning coefficient C_n of its spin", default=0.0)
     oil_share: Scalar = parameter("1", 0.0, 1.0, "share of oil in the volume between the rings", default=0.02)
@@ -284,13 +266,7 @@ class PocketForces(NamedTuple):
 
 
 def pocket_contact(
-    model: Any,
-    out: Scalar,
-    along: Scalar,
-    v_out: Scalar,
-    v_along: Scalar,
-    spin: Scalar,
-    cage_speed: Scalar,
+    model: Any, out: Scalar, along: Scalar, v_out: Scalar, v_along: Scalar, spin: Scalar, cage_speed: Scalar
 ) -> PocketForces:
     """The bars on a roller.
 

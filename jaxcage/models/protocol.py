@@ -16,7 +16,7 @@ import numpy as np
 
 from .._arguments import is_concrete
 from .._errors import ArgumentError, InputError
-from .._kinematics import FASTEST as FASTEST
+from .._kinematics import FASTEST
 from .._pytrees import Scalar, State
 from ..quantities import Quantity
 from .field import AbstractField
@@ -119,15 +119,6 @@ class AbstractForcedSystem(eqx.Module):
     def centre(self, y: Any) -> tuple[Scalar, Scalar]:
         """Centre of the cage from that of its land, over the clearance, in models that have one."""
         raise NotImplementedError
-
-    def roller_history(self, run: Any) -> Any:
-        """Forces, loads and slips of every roller at the samples of a time history (`RollerHistory`), in models that
-        have rollers."""
-        raise NotImplementedError
-
-    def known_orders(self, run: Any) -> dict[str, float]:
-        """Frequencies that a bearing is known by, over that of the phase: means over a time history."""
-        return {}
 
     def reference(self, speed: Scalar) -> dict[str, Scalar]:
         """Numbers by name that the quantities refer to, such as the cage speed in pure rolling."""

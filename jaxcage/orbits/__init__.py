@@ -7,7 +7,7 @@
 | `orbit`           | periodic orbits, their multipliers, and the determinant these must have             |
 | `point`           | bifurcation points: kinds, and matrices and functions that vanish there             |
 | `arclength`       | step control of continuation: predictions, accepted and rejected steps              |
-| `continuation`    | pseudo-arclength continuation, an iterator with corrector, step control and events  |
+| `continuation`    | pseudo-arclength continuation, an iterator with step control and events             |
 | `location`        | bifurcations between orbits of a branch, compared with every change of stability    |
 | `branch`          | branches of orbits with their bifurcations                                          |
 | `bifurcation`     | Newton's method for bifurcation points                                              |
@@ -20,17 +20,8 @@
 from .._arguments import check_layer
 from .arclength import StepControl as StepControl
 from .bifurcation import bifurcation as bifurcation
-from .branch import (
-    Branch as Branch,
-    branch as branch,
-)
-from .curves import (
-    Curve as Curve,
-    Followed as Followed,
-    curve as curve,
-    follow as follow,
-    follow_all as follow_all,
-)
+from .branch import Branch as Branch, branch as branch
+from .curves import Curve as Curve, Followed as Followed, curve as curve, follow as follow, follow_all as follow_all
 from .gradient import (
     OrbitSlopes as OrbitSlopes,
     Sensitivity as Sensitivity,
@@ -39,12 +30,8 @@ from .gradient import (
     sensitivity as sensitivity,
     width as width,
 )
-from .orbit import (
-    Orbit as Orbit,
-    periodic_orbit as periodic_orbit,
-)
+from .orbit import Orbit as Orbit, periodic_orbit as periodic_orbit
 from .point import Point as Point
-from .problem import pick as pick
 from .search import (
     StableRange as StableRange,
     SynchronousOrbits as SynchronousOrbits,

@@ -12,16 +12,9 @@ from .._errors import ArgumentError
 from .._pytrees import Scalar
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
-from ..solve import AbstractMethod, Rodas4
+from ..solve import IMPLICIT, AbstractMethod
 from .arclength import Points, StepControl
-from .continuation import (
-    Continuation,
-    ContinuationProblem,
-    Event,
-    Path,
-    Start,
-    orbit_curves,
-)
+from .continuation import Continuation, ContinuationProblem, Event, Path, Start, orbit_curves
 from .location import Place, bifurcations_of
 from .orbit import NearOrbit, Orbit
 from .point import UNEXPLAINED, Outcome, Point, read_start
@@ -103,7 +96,7 @@ def branch(
     problem = orbit_curves(Given(system, start.speed), parameter, lower, upper, method, periods)
     at = float(start.at)
     problem.require_inside("orbit", at)
-    if method is None and isinstance(orbit, Orbit) and isinstance(orbit.solver, Rodas4):
+    if method is None and isinstance(orbit, Orbit) and orbit.solver == IMPLICIT:
         problem = problem.by_rodas4()
     (found,) = follow_both_ways(problem, [(np.asarray(start.state), at)], steps)
     if found is None:

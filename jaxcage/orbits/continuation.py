@@ -35,7 +35,6 @@ from .problem import (
     Counts,
     Given,
     Parameter,
-    by_rodas4,
     by_steps,
     counted,
     make_problem,
@@ -99,7 +98,7 @@ class ContinuationProblem:
 
     def by_rodas4(self) -> "ContinuationProblem":
         """Return the problem with Rodas4, which chooses its number of steps."""
-        method, counts = by_rodas4()
+        method, counts = counted(None, solver="rodas4")
         equations = eqx.tree_at(lambda e: e.problem.method, self.equations, method)
         return dataclasses.replace(self, equations=equations, counts=counts)
 

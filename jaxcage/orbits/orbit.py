@@ -3,7 +3,6 @@
 import dataclasses
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-import diffrax as dfx
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -89,7 +88,7 @@ class Orbit(eqx.Module):
     error: Float[Array, ""]
     converged: Bool[Array, ""]
     periods: Int[Array, ""]
-    solver: dfx.AbstractSolver | AbstractMethod = eqx.field(static=True)
+    solver: str | AbstractMethod = eqx.field(static=True)
 
     @property
     def method(self) -> AbstractMethod:

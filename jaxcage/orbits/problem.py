@@ -17,7 +17,6 @@ from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
-import jax.extend as jex
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
@@ -26,11 +25,11 @@ from jaxtyping import Array, Float, Int
 from .._parameters import Parameter as Parameter, pick as pick
 from .._pytrees import Scalar
 from ..models import AbstractForcedSystem
-from ..solve import REVOLUTION, AbstractMethod, FixedSteps, StrobeMap, method as make_method, strobe_map
+from ..solve import REVOLUTION, AbstractMethod, FixedSteps, StrobeMap, depends, method as make_method, strobe_map
 
 
 SPEED = "speed"
-FIRST, FIRST_OF_RODAS4, MOST = 256, 512, 16384
+FIRST, MOST = {"rk4": 256, "rodas4": 512}, 16384  # least steps of each method, and most of all
 MOST_OF_A_POINT = 2 * MOST  # a bifurcation point by 16384 steps is confirmed by twice as many
 ENOUGH = 4096  # most steps of a computation that only provides a guess
 GIVEN_UP = 2048  # if this many steps find nothing, more are not tried
@@ -59,17 +58,6 @@ def value_of(system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> 
 
 def name_of(parameter: Parameter) -> str:
     return parameter if isinstance(parameter, str) else "parameter"
-
-
-def _depends_on_input(f: Callable[[Array], list[Array]], x: Array) -> list[bool]:
-    """Return for each array of f(x) True if it depends on x."""
-    traced = jax.make_jaxpr(f)(x).jaxpr
-    touched = set(traced.invars)
-    reached = lambda v: not isinstance(v, jex.core.Literal) and v in touched
-    for equation in traced.eqns:
-        if any(map(reached, equation.invars)):
-            touched.update(equation.outvars)
-    return list(map(reached, traced.outvars))
 
 
 def frozen(tree: Any) -> Any:
@@ -145,7 +133,7 @@ class OrbitProblem(eqx.Module):
         """Return the derivatives of the field's numbers by the i-th unknown, None for those independent of it."""
         row = lambda x: jax.tree.leaves(eqx.filter(self.prepare(u.at[i].set(x), given).field, eqx.is_inexact_array))
         _, slope = jax.jvp(row, (u[i],), (jnp.ones_like(u[i]),))
-        return [s if d else None for s, d in zip(slope, _depends_on_input(row, u[i]), strict=True)]
+        return [s if d else None for s, d in zip(slope, depends(row, u[i]), strict=True)]
 
     def returned(self, strobe: StrobeMap, z: Float[Array, " dim"], drifts: Sequence[Any] = ()) -> tuple[Array, Array]:
         """Apply the return map, the strobe map `periods` times.
@@ -216,23 +204,16 @@ class Counts(NamedTuple):
         return float(self.tolerance) > 0
 
 
-def counted(
-    method: AbstractMethod | None, most: int = MOST, solver: str = "rk4", first: int = FIRST
-) -> tuple[AbstractMethod, Counts]:
+def counted(method: AbstractMethod | None, most: int = MOST, solver: str = "rk4") -> tuple[AbstractMethod, Counts]:
     """Return a method with its number of steps left open, and the numbers to try: half the method's own number and that
-    number or, without a method, as many as are needed."""
-    chosen, begin, last = make_method(solver) if method is None else method, first, most
+    number or, without a method, as many of `solver` as are needed."""
+    chosen, begin, last = make_method(solver) if method is None else method, FIRST[solver], most
     if not isinstance(chosen, FixedSteps):
         begin, last = 1, 1
     elif method is not None:
         begin, last = jnp.maximum(chosen.steps // 2, 1), chosen.steps
     counts = Counts(jnp.asarray(begin, int), jnp.asarray(last, int), jnp.asarray(float(method is None)))
     return by_steps(chosen, 1), counts
-
-
-def by_rodas4(most: int = MOST) -> tuple[AbstractMethod, Counts]:
-    """Return Rodas4 with its number of steps left open, and the numbers to try."""
-    return counted(None, most, "rodas4", FIRST_OF_RODAS4)
 
 
 T = TypeVar("T", bound=eqx.Module)
@@ -255,4 +236,4 @@ def with_fallback(
     found = find(*counted(method, most))
     if method is not None or isinstance(good := serves(found), Tracer) or bool(good):
         return found
-    return find(*by_rodas4(most))
+    return find(*counted(None, most, "rodas4"))

@@ -79,7 +79,8 @@ def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Tab
     history = rollers.history
     turns = abs(history.angle[-1] - history.angle[0]) / (2 * np.pi) / (history.time[-1] - history.time[0])
     for name, spectrum in rollers.spectra.items():
-        lines = [vars(line) | {"frequency_hz": turns * line.order} for line in named_lines(spectrum, rollers.orders)]
+        named = named_lines(spectrum, rollers.orders)
+        lines = [line._asdict() | {"frequency_hz": turns * line.order} for line in named]
         tables.append(table(f"Spectrum, {SPECTRA[name]}", lines, columns))
     return tables
 

@@ -14,6 +14,7 @@ from matplotlib.patches import Annulus, Circle, Polygon
 
 from ..analysis import Around, OrderSpectrum, RollerHistory, around, bearing_spectra, cage_forces
 from ..bearing import LoadDistribution
+from ..models import bearing_orders, roller_history
 from ..quantities import component_names, quantity
 from ..solve import Trajectory
 from . import style
@@ -43,9 +44,9 @@ def rollers_of(model: Any, run: Trajectory) -> Rollers | None:
     """Rollers of a run; None for a model without rollers."""
     if model.samples == 1:
         return None
-    history = model.roller_history(run)
+    history = roller_history(model, run)
     several = len(history.time) >= 2 * history.samples
-    return Rollers(history, around(history), bearing_spectra(history) if several else {}, model.known_orders(run))
+    return Rollers(history, around(history), bearing_spectra(history) if several else {}, bearing_orders(model, run))
 
 
 def time_history(trajectory: Trajectory, ax: Axes | None = None) -> Axes:

@@ -4,19 +4,14 @@
 |---------------|-----------------------------------------------------------------------------------------|
 | `program`     | a traced scalar function: its elementary operations                                     |
 | `ir`          | such a function as LLVM IR on vectors of lanes                                          |
-| `object_code` | compiling, storing and loading LLVM IR                                                  |
+| `object_code` | compiling, storing and loading LLVM IR; its call from JAX's programs                    |
 | `layout`      | inputs of the loop: methods, programs of a model, rows of its working memory            |
-| `step_control`| the estimated error of a step, and the size of the next one                             |
-| `loop`        | the integration loop: lanes, strobe states, growth of tangent vectors                   |
+| `loop`        | the integration loop: lanes, step control, strobe states, growth of tangent vectors     |
 | `fields`      | a model's programs for that loop; the whole bearing as a loop over its rollers          |
 | `engine`      | the engine of a model; lanes, each a design at a speed; histories                       |
-| `jax_engine`  | the engine inside JAX, for methods and laws without machine code                        |
 | `method`      | methods by name: machine code, a fixed number of steps, or adaptive steps               |
-| `solvers`     | diffrax solvers of our own: Rosenbrock, classical Runge-Kutta                           |
 | `kernel`      | a step of a method as a scalar function                                                 |
-| `xla_call`    | machine code called from JAX's programs                                                 |
 | `march`       | equal steps inside JAX's programs: lanes, tangents, derivatives of any order            |
-| `strobe_map`  | the strobe map, differentiable by state, speed and parameters                           |
 | `simulate`    | time histories, speed ramps                                                             |
 | `outcomes`    | results of a run, and how it ended                                                      |
 """
@@ -27,6 +22,7 @@ from .engine import (
     SURE as SURE,
     WIDTH as WIDTH,
     Engine as Engine,
+    JaxEngine as JaxEngine,
     Lanes as Lanes,
     cores as cores,
     engine_of as engine_of,
@@ -34,16 +30,17 @@ from .engine import (
     histories as histories,
 )
 from .ir import say_once as say_once
-from .jax_engine import JaxEngine as JaxEngine
-from .kernel import REVOLUTION as REVOLUTION
+from .kernel import REVOLUTION as REVOLUTION, rosenbrock_step as rosenbrock_step
 from .march import march as march
 from .method import (
     IMPLICIT as IMPLICIT,
     AbstractMethod as AbstractMethod,
     FixedSteps as FixedSteps,
     NativeSteps as NativeSteps,
+    StrobeMap as StrobeMap,
     method as method,
     native as native,
+    strobe_map as strobe_map,
 )
 from .outcomes import (
     FINISHED as FINISHED,
@@ -55,9 +52,8 @@ from .outcomes import (
     TOO_MANY as TOO_MANY,
     March as March,
 )
+from .program import depends as depends
 from .simulate import Trajectory as Trajectory, ramp as ramp, simulate as simulate
-from .solvers import Rodas4 as Rodas4, rosenbrock_step as rosenbrock_step
-from .strobe_map import StrobeMap as StrobeMap, strobe_map as strobe_map
 
 
 check_layer(globals(), "method native ramp simulate strobe_map")

@@ -1,7 +1,7 @@
 """The engine: integration of many lanes, each a design at a speed, from strobe state to strobe state.
 
-`engine_of` makes the engine of a model: machine code, or JAX's own loop (`jax_engine`) for methods and laws without
-machine code. Both take and return the same arrays.
+`engine_of` makes the engine of a model: `Engine` in machine code or, for methods and laws without machine code,
+`JaxEngine`, a loop inside JAX. Both take and return the same arrays.
 """
 
 import concurrent.futures
@@ -20,15 +20,14 @@ from jaxtyping import Array, Float, Int
 
 from .._errors import ArgumentError
 from .._pytrees import Form, compiled, split
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, divide, multiply
 from .fields import SAMPLED, numbers_at, shape_of_numbers, traced_field
 from .ir import UnknownOperation, say_once
-from .jax_engine import JaxEngine
 from .layout import REVOLUTION, Tableau, layout_of
 from .loop import march_ir
-from .method import IMPLICIT, AbstractMethod, NativeSteps
+from .method import IMPLICIT, AbstractMethod, NativeSteps, StrobeMap
 from .object_code import function
-from .outcomes import March
+from .outcomes import FINISHED, March
 
 
 WIDTH = 8
@@ -43,6 +42,8 @@ SURE = 3.0
 """Safety factor: the stated error over the difference of two runs."""
 RETRIES = 3
 """Maximum number of times that a lane with too large an error is run again, each with a 16 times smaller tolerance."""
+TOGETHER = 64
+"""Maximum number of lanes per call of the engine inside JAX."""
 CHUNK = 4096
 """Number of strobe states of a revolution, of all lanes together, that are computed at a time."""
 
@@ -184,6 +185,79 @@ def _run_threads(run: Callable[[], None], count: int, queue: np.ndarray, report:
             raise
 
 
+class _Advance(eqx.Module):
+    """Advance of a lane from the i-th to the next strobe state of a revolution, in units of its scale."""
+
+    method: AbstractMethod
+    samples: int
+
+    def __call__(self, system: AbstractForcedSystem, speed: Array, y: Array, tangents: Array, i: Array) -> Any:
+        scale = system.scale(speed)
+        state, row = lambda z: multiply(tuple(z), scale), lambda z: jnp.stack(divide(z, scale))
+        strobe = StrobeMap(system.at_speed(speed), system, scale, self.method)
+        moved = strobe.part(state(y), i, self.samples, [(state(t), None) for t in tangents])
+        after = jnp.stack([row(t) for t in moved.tangents]) if moved.tangents else tangents
+        return row(moved.y), after, moved.peak, moved.outcome
+
+
+class JaxEngine:
+    """Integration loop inside JAX, called like `Engine` with lanes as their own numbers.
+
+    **Arguments:** number of tangent vectors; strobe states per revolution.
+    """
+
+    def __init__(self, tangents: int, samples: int):
+        self._tangents, self._samples = tangents, samples
+
+    def numbers(self, lanes: "Lanes") -> "Lanes":
+        return lanes
+
+    @staticmethod
+    def picked(lanes: Any, some: Int[np.ndarray, " some"]) -> Any:
+        return lanes.at(some)
+
+    def __call__(
+        self,
+        lanes: "Lanes",
+        state: Float[np.ndarray, "lanes numbers"],
+        strobes: int,
+        keep: int,
+        method: AbstractMethod,
+        *,
+        begin: Any = 0,
+        tangents: Float[np.ndarray, "lanes tangents dim"] | None = None,
+        step: Any = None,
+        threads: int = 1,
+        report: Callable[[float], None] = lambda done: None,
+    ) -> March:
+        """Run lanes like `Engine`, but with the first step chosen by the solver."""
+        (count, dim), y, m = state.shape, state.copy(), self._tangents
+        t = np.zeros((count, 0, dim)) if tangents is None else tangents.copy()
+        strobe, growth = np.full((count, keep, dim), np.nan), np.full((count, strobes, m), np.nan)
+        outcome, peaks = np.full(count, FINISHED), np.zeros(count)
+        first, advance = np.broadcast_to(begin, count), _Advance(method.in_jax, self._samples)
+        with concurrent.futures.ThreadPoolExecutor(threads) as pool:
+            for k in range(strobes):
+                alive = np.flatnonzero(outcome == FINISHED)
+                if not alive.size:
+                    break
+                i = (first + k) % self._samples
+                chunk = lambda some, i=i: lanes.each(advance, some, y[some], t[some], i[some])
+                found = pool.map(chunk, np.split(alive, range(TOGETHER, alive.size, TOGETHER)))
+                y1, t1, peak, outcome[alive] = (np.concatenate(x) for x in zip(*found, strict=True))
+                peaks[alive] = np.maximum(peaks[alive], peak)
+                well = outcome[alive] == FINISHED
+                alive, y1, t1 = alive[well], y1[well], t1[well]
+                y[alive], strobe[alive, k % keep] = y1, y1
+                if m and alive.size:
+                    q, r = np.linalg.qr(np.swapaxes(t1, 1, 2))
+                    t[alive] = np.swapaxes(q, 1, 2)
+                    growth[alive, k] = np.log(np.abs(np.diagonal(r, axis1=1, axis2=2)))
+                report(count * (k + 1) / strobes)
+        latest_last, none = np.roll(strobe, -strobes % keep, axis=1), np.zeros(count)
+        return March(y, t, none, peaks[:, None, None], none, outcome, latest_last, growth)
+
+
 _engines: dict[Any, Engine | JaxEngine] = {}
 
 
@@ -203,7 +277,7 @@ def engine_of(
             _engines[key] = Engine(system, tangents, several, pair, samples)
         except UnknownOperation as operation:
             say_once(str(operation))
-    return _engines.setdefault(key, JaxEngine(system, tangents, several, samples))
+    return _engines.setdefault(key, JaxEngine(tangents, samples))
 
 
 def has_implicit(system: AbstractForcedSystem) -> bool:
@@ -317,11 +391,7 @@ def _scale_and_excursion(system: AbstractForcedSystem, speed: Array, y: Array) -
 
 
 def histories(
-    lanes: Lanes,
-    y0: Float[np.ndarray, "lanes dim"],
-    samples: int,
-    revolutions: int,
-    method: AbstractMethod,
+    lanes: Lanes, y0: Float[np.ndarray, "lanes dim"], samples: int, revolutions: int, method: AbstractMethod
 ) -> tuple[Float[np.ndarray, "lanes samples dim"], Float[np.ndarray, " lanes"]]:
     """States of lanes [SI] at `samples` phases of each of `revolutions`, and the largest error of a revolution [scale].
 

@@ -24,9 +24,9 @@ from ..models import (
     multiply,
 )
 from .ir import Code, UnknownOperation, Value, is_variable, number
+from .kernel import rosenbrock_step
 from .layout import Field, Layout, fixed_numbers, rates_arguments
-from .program import Program, Sizes, following, needed, program_of
-from .solvers import rosenbrock_step
+from .program import Program, Sizes, depends, needed, program_of
 
 
 SAMPLED = 2
@@ -99,13 +99,11 @@ def shape_of_numbers(system: AbstractForcedSystem, several: bool) -> tuple[Form,
 
     **Raises:** `UnknownOperation` for arrays of numbers.
     """
-    traced = jax.make_jaxpr(lambda speed: _floats(_pieces(system, speed)[1]))(1.0).jaxpr
-    if any(v.aval.shape for v in traced.outvars):
+    form, numbers = _pieces(system, jnp.asarray(1.0))
+    if any(map(jnp.ndim, numbers)):
         raise UnknownOperation("array")
-    moved = following(traced.eqns, traced.invars)
-    return _pieces(system, jnp.asarray(1.0))[0], tuple(
-        several or (is_variable(v) and v in moved) for v in traced.outvars
-    )
+    moved = depends(lambda speed: _floats(_pieces(system, speed)[1]), 1.0)
+    return form, tuple(several or each for each in moved)
 
 
 def traced_field(
@@ -138,7 +136,7 @@ def traced_field(
         (field, _, scale), (h, *y) = pieces(fixed), moved
 
         def go(y: Any) -> Any:
-            y1, error, *_ = rosenbrock_step(ScaledField(field, scale), phase, lambda _: h, y)
+            y1, error, _ = rosenbrock_step(ScaledField(field, scale), phase, lambda _: h, y)
             return _floats((*y1, *error)), ()
 
         found = _with_tangents(go, y, n, tangents)
@@ -183,52 +181,34 @@ class RollersCode(NamedTuple):
         table = ", ".join(f"double {number(x).text}" for pair in zip(np.cos(places), np.sin(places)) for x in pair)
         # MOVING sums for the values and for each tangent, then the other sums, then the largest force and slip.
         moving, others = MOVING * (1 + tangents), PASSED - MOVING
-        begin = w.block
-        w.line("br label %roller")
-        w.line("roller:")
-        names = [f"%sum{k}" for k in range(moving + others + 2)]
-        sums = [Value(name, "double", True) for name in names]
-        j = Value("%j", "i64", False)
-        at = w.simple("mul", j, Value("2", "i64", False))
-        cos_at = w.let(f"getelementptr double, ptr @places, i64 {at.text}", "ptr", False)
-        sin_at = w.let(f"getelementptr double, ptr {cos_at.text}, i64 1", "ptr", False)
-        place = [w.let(f"load double, ptr {x.text}", "double", False) for x in (cos_at, sin_at)]
-        first = w.simple("mul", j, Value(str(OF_ROLLER), "i64", False))
-        row = lambda k: w.simple("add", first, Value(str(k), "i64", False))
+        whole = lambda k: Value(str(k), "i64", False)
+
+        def roller(at: Any, sums: list[Value]) -> list[Value]:
+            j = at(0)
+            cos_at = w.let(f"getelementptr double, ptr @places, i64 {w.simple('mul', j, whole(2)).text}", "ptr", False)
+            sin_at = w.let(f"getelementptr double, ptr {cos_at.text}, i64 1", "ptr", False)
+            place = [w.let(f"load double, ptr {x.text}", "double", False) for x in (cos_at, sin_at)]
+            first = w.simple("mul", j, whole(OF_ROLLER))
+            row = lambda k: w.simple("add", first, whole(k))
+            numbers: list[Value] = []
+            for t in range(1 + tangents):
+                numbers += [w.get(row(size * t + k), base="%place") for k in range(OF_ROLLER)] + own[t]
+            arguments = [number(0.0), *place, cos, sin, *numbers]
+            fixed = fixed_numbers(w, field, rows, self.roller, len(arguments))
+            results, passed = w.program(self.roller, [*arguments, *fixed]), []
+            for t in range(1 + tangents):
+                part = results[t * (OF_ROLLER + MOVING) : (t + 1) * (OF_ROLLER + MOVING)]
+                for k, x in enumerate(part[:OF_ROLLER]):
+                    w.put(row(size * t + k), x, base="%out")
+                passed += part[OF_ROLLER:]
+            *rest, slip = results[(1 + tangents) * (OF_ROLLER + MOVING) :]
+            added = [w.add(s, w.widened(x)) for s, x in zip(sums, [*passed, *rest], strict=False)]
+            largest = zip(sums[-2:], (rest[NORMAL - MOVING], slip), strict=True)
+            return added + [w.larger(w.widened(x), s) for s, x in largest]
+
+        begin = [number(0.0)] * (moving + others) + [number(-np.inf)] * 2
+        new = w.over(z, begin, roller, written_out=0)
         numbers: list[Value] = []
-        for t in range(1 + tangents):
-            numbers += [w.get(row(size * t + k), base="%place") for k in range(OF_ROLLER)] + own[t]
-        arguments = [number(0.0), *place, cos, sin, *numbers]
-        fixed = fixed_numbers(w, field, rows, self.roller, len(arguments))
-        results = w.program(self.roller, [*arguments, *fixed])
-        rates, passed = [], []
-        for t in range(1 + tangents):
-            part = results[t * (OF_ROLLER + MOVING) : (t + 1) * (OF_ROLLER + MOVING)]
-            rates.append(part[:OF_ROLLER])
-            passed += part[OF_ROLLER:]
-        *rest, slip = results[(1 + tangents) * (OF_ROLLER + MOVING) :]
-        for t, part in enumerate(rates):
-            for k, x in enumerate(part):
-                w.put(row(size * t + k), x, base="%out")
-        new = [w.add(s, w.widened(x)) for s, x in zip(sums, [*passed, *rest], strict=False)]
-        largest = zip(sums[-2:], (rest[NORMAL - MOVING], slip), strict=True)
-        new += [w.larger(w.widened(x), s) for s, x in largest]
-        latch = w.block
-        w.line("%j_next = add i64 %j, 1")
-        w.line(f"%more = icmp slt i64 %j_next, {z}")
-        w.line("br i1 %more, label %roller, label %bodies")
-        w.line("bodies:")
-        lines, w.lines = w.lines, []
-        vector = w.type("double", True)
-        start = lambda k: f"splat (double {number(-np.inf if k >= moving + others else 0.0).text})"
-        phis = [f"  %j = phi i64 [ 0, %{begin} ], [ %j_next, %{latch} ]"]
-        phis += [
-            f"  {name} = phi {vector} [ {start(k)}, %{begin} ], [ {x.text}, %{latch} ]"
-            for k, (name, x) in enumerate(zip(names, new, strict=True))
-        ]
-        where = lines.index("roller:") + 1
-        w.lines = [*lines[:where], *phis, *lines[where:]]
-        numbers = []
         for t in range(1 + tangents):
             numbers += own[t] + new[t * MOVING : (t + 1) * MOVING]
         arguments = [number(0.0), cos, sin, *numbers, *new[moving:]]

@@ -371,13 +371,17 @@ class Code:
         return [self.get(r) for r in rows]
 
     def over(
-        self, count: int, begin: Sequence[Value], body: Callable[[Callable[[int], int | Value], list[Value]], Any]
+        self,
+        count: int,
+        begin: Sequence[Value],
+        body: Callable[[Callable[[int], int | Value], list[Value]], Any],
+        written_out: int = WRITTEN_OUT,
     ) -> list[Value]:
         """Apply `body(row, values)` to `begin` and then to its results, for `count` rows, unrolled if they are few;
         `row(k)` is the k-th row plus the number of the present pass."""
         rest = lambda new: [] if new is None else list[Value](new)
         values = [self.widened(v) for v in begin]
-        if count <= WRITTEN_OUT:
+        if count <= written_out:
             for q in range(count):
                 values = rest(body(lambda k, q=q: k + q, values))
             return values
@@ -388,14 +392,14 @@ class Code:
         outer, self.lines = self.lines, []
         self.block = loop
         new = rest(body(lambda k: self.simple("add", place, Value(str(k), "i64", False)) if k else place, inside))
-        assert self.block == loop
+        latch = self.block
         lines, self.lines = self.lines, outer
         vector = self.type("double", True)
         self.line(f"br label %{loop}")
         self.line(f"{loop}:")
-        self.line(f"{place.text} = phi i64 [ 0, %{before} ], [ {place.text}_next, %{loop} ]")
+        self.line(f"{place.text} = phi i64 [ 0, %{before} ], [ {place.text}_next, %{latch} ]")
         for old, start, after in zip(inside, values, new, strict=True):
-            self.line(f"{old.text} = phi {vector} [ {start.text}, %{before} ], [ {after.text}, %{loop} ]")
+            self.line(f"{old.text} = phi {vector} [ {start.text}, %{before} ], [ {after.text}, %{latch} ]")
         self.lines += lines
         self.line(f"{place.text}_next = add i64 {place.text}, 1")
         self.line(f"{place.text}_more = icmp slt i64 {place.text}_next, {count}")

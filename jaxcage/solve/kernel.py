@@ -1,11 +1,16 @@
-"""One step of a method as scalar code, for `march`: the numbers of field, system and scale are its fixed numbers."""
+"""One step of a method as scalar code, for `march`: the numbers of field, system and scale are its fixed numbers.
+
+A Rosenbrock method solves only linear systems, with one matrix per step:
+    (shift I - J) U_i = f(t + alpha_i h, y + sum_j a_ij U_j) + sum_j c_ij U_j / h + gamma_i h df/dt,
+    y_1 = y + sum_i m_i U_i,  error = sum_i e_i U_i,  shift = 1/(gamma h).
+The field's linearisation provides the solver: for a second-order system it eliminates the positions in closed form.
+"""
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import diffrax as dfx
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -13,10 +18,9 @@ from jaxtyping import Array, Int
 
 from .._pytrees import Form, Scalar, State, split
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, Linearisation
-from .layout import REVOLUTION
+from .layout import REVOLUTION, Tableau
 from .march import march_with_tangents
 from .program import Numbers
-from .solvers import Rodas4, explicit_step, rosenbrock_step
 
 
 Parts = Int[Array, ""] | Scalar
@@ -34,11 +38,81 @@ class Pieces(NamedTuple):
     scale: State
 
 
-def can_be_kernel(solver: Any) -> bool:
-    """True if a step of `solver` is a closed formula: `Rodas4`, and explicit methods with FSAL (first same as last)."""
-    if isinstance(solver, dfx.AbstractERK):
-        return isinstance(solver.tableau, dfx.ButcherTableau) and solver.tableau.fsal
-    return isinstance(solver, Rodas4)
+EXPLICIT = {
+    "rk4": Tableau(
+        [0.0, 1 / 2, 1 / 2, 1.0, 1.0],
+        [[], [1 / 2], [0.0, 1 / 2], [0.0, 0.0, 1.0], [1 / 6, 1 / 3, 1 / 3, 1 / 6]],
+        [],
+        4,
+    ),
+    "tsit5": Tableau.named("tsit5"),
+}
+"""Explicit methods with equal steps: Kutta's of 1901, and Tsitouras' of 2011."""
+
+
+def combine(base: State, weights: Any, stages: list[State], factor: Scalar = 1.0) -> State:
+    """Return base + factor * sum of weights times stages, without terms of zero weight."""
+    used = [(float(w), u) for w, u in zip(weights, stages, strict=False) if w != 0.0]
+    return tuple(b + factor * sum(w * u[i] for w, u in used) if used else b for i, b in enumerate(base))
+
+
+# E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), sec. VI.4 (their code RODAS), in
+# the form of sec. IV.7; GAMMA_SUM are the row sums of gamma_ij.
+GAMMA = 0.25
+ALPHA = (0.0, 0.386, 0.21, 0.63, 1.0, 1.0)
+GAMMA_SUM = (0.25, -0.1043, 0.1035, -0.03620000000000023, 0.0, 0.0)
+_LAST = (1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950)
+A: tuple[tuple[float, ...], ...] = (
+    (),
+    (1.544,),
+    (0.9466785280815826, 0.2557011698983284),
+    (3.314825187068521, 2.896124015972201, 0.9986419139977817),
+    _LAST,
+    (*_LAST, 1.0),
+)
+C: tuple[tuple[float, ...], ...] = (
+    (),
+    (-5.6688,),
+    (-2.430093356833875, -0.2063599157091915),
+    (-0.1073529058151375, -9.594562251023355, -20.47028614809616),
+    (7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160),
+    (8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054),
+)
+M = (*_LAST, 1.0, 1.0)
+E = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def rosenbrock_step(
+    field: AbstractField, t0: Scalar, size: Callable[[State], Scalar], y0: State
+) -> tuple[State, State, Scalar]:
+    """Take one step of Rodas4 (six stages, order 4(3)) from y0 at phase t0, whose size is a function of the initial
+    rate; return the new state, the error estimate of the embedded method, and the step size."""
+    near = field.linearise(t0, y0)
+    h = size(near.value)
+    solve = near.solver(1 / (GAMMA * h))
+    zero = tuple(jnp.zeros_like(c) for c in near.value)
+    stages: list[State] = []
+    rates = near.value
+    for i, a_row in enumerate(A):
+        if any(a_row):  # otherwise the stage is evaluated at (t0, y0) like the first
+            rates = field(t0 + ALPHA[i] * h, combine(y0, a_row, stages))
+        r = combine(rates, C[i], stages, 1 / h)
+        if GAMMA_SUM[i] != 0.0:
+            r = tuple(c + GAMMA_SUM[i] * h * s for c, s in zip(r, near.phase_derivative, strict=True))
+        stages.append(solve(r))
+    return combine(y0, M, stages), combine(zero, E, stages), h
+
+
+def explicit_step(
+    tableau: Tableau, field: AbstractField, t0: Scalar, size: Callable[[State], Scalar], y0: State
+) -> tuple[State, Scalar]:
+    """Take one step of an explicit method from y0 at phase t0, whose size is a function of the initial rate; return the
+    new state and the step size."""
+    stages = [field(t0, y0)]
+    h = size(stages[0])
+    for c, row in zip(tableau.phase[1:-1], tableau.stages[1:-1], strict=True):
+        stages.append(field(t0 + c * h, combine(y0, row, stages, h)))
+    return combine(y0, tableau.stages[-1], stages, h), h
 
 
 NEARNESS = 0.2
@@ -85,7 +159,8 @@ class KernelStep:
     """One step for `march`: moved is the state; watched are the largest excursion and, if steps are shortened, the
     phase; fixed are the first phase, step size, final phase, and the numbers of (field, system, scale)."""
 
-    solver: Any
+    solver: str
+    """Name of an explicit method, or `rodas4`."""
     structure: Form
     abrupt: bool
     """True if the law has abrupt changes, near which steps are shortened."""
@@ -105,10 +180,10 @@ class KernelStep:
         def size(rate: State) -> Scalar:
             return shortened(h, system.abrupt(moved, rate), t0, end) if self.abrupt else h
 
-        if isinstance(self.solver, dfx.AbstractERK):
-            y, step = explicit_step(self.solver.tableau, field, t0, size, moved)
+        if self.solver in EXPLICIT:
+            y, step = explicit_step(EXPLICIT[self.solver], field, t0, size, moved)
         else:
-            y, _, _, step = rosenbrock_step(field, t0, size, moved)
+            y, _, step = rosenbrock_step(field, t0, size, moved)
             if self.abrupt:  # a step of size zero divides by zero
                 y = tuple(jnp.where(step > 0, a, b) for a, b in zip(y, moved, strict=True))
         if self.abrupt:
@@ -117,7 +192,7 @@ class KernelStep:
 
 
 def steps_through(
-    solver: Any, steps: Any, pieces: Pieces, y: State, phase: Any, parts: Parts, tangents: Tangents
+    solver: str, steps: Any, pieces: Pieces, y: State, phase: Any, parts: Parts, tangents: Tangents
 ) -> tuple[State, Scalar, tuple[State, ...]]:
     """Advance by one of `parts` equal parts of a revolution of `steps` steps, and more near abrupt changes of the law;
     return the final state, the largest excursion and the tangent vectors."""

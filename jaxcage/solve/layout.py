@@ -10,12 +10,14 @@ from .ir import Code, Value, number
 
 
 REVOLUTION = 2 * math.pi
+IMPLICIT = "rodas4"
+"""Method for lanes that take too many or too short steps with an explicit one."""
 PAIRS: dict[str, tuple[type[dfx.AbstractERK] | None, int]] = {
     "tsit5": (dfx.Tsit5, 5),
     "dopri5": (dfx.Dopri5, 5),
     "bosh3": (dfx.Bosh3, 3),
     "dopri8": (dfx.Dopri8, 8),
-    "rodas4": (None, 4),
+    IMPLICIT: (None, 4),
 }
 """Embedded explicit pairs and the implicit method (None) by name, with their order."""
 

@@ -3,7 +3,7 @@
 A step is written for a single lane, on scalars:
 - `jax.vmap` adds lanes; numbers common to all lanes remain scalars;
 - `jax.jvp` and `jax.jacfwd` add tangent vectors to the step, to any order; several directions share its values;
-- on a CPU JAX's program calls machine code (`ir`, `xla_call`), in a few microseconds and without compilation by XLA;
+- on a CPU JAX's program calls machine code (`ir`, `object_code`), in a few microseconds and without compilation by XLA;
   elsewhere, and for a step with an operation that has no translation, the loop runs inside JAX.
 
 Reverse mode goes through columns: a Jacobian matrix in forward mode, transposed (`orbits.newton.by_columns`).
@@ -25,8 +25,8 @@ from jaxtyping import Array, Int
 
 from .._errors import InputError
 from .ir import Code, UnknownOperation, Value, number, say_once
+from .object_code import UnknownInterface, handler_ir, registered
 from .program import CONTROL_FLOW, Numbers, Sizes, Step, program_of
-from .xla_call import UnknownInterface, handler_ir, registered
 
 
 WIDTH = 8

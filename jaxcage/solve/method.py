@@ -1,4 +1,8 @@
-"""Integration methods: a solver together with its choice of steps, and the advance by a part of a revolution."""
+"""Integration methods, each a solver with its choice of steps, and the strobe (Poincaré) map by one of them.
+
+The map advances a system by one revolution, from phase 0 to phase 2 pi. It is differentiable (forward mode) by state,
+speed and every parameter of the system.
+"""
 
 import abc
 import math
@@ -10,14 +14,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Int
 
+from .._arguments import require_x64
 from .._errors import ArgumentError
 from .._pytrees import Scalar, State, split
-from ..models import ESCAPE, ScaledField, divide, multiply
-from .kernel import REVOLUTION, Parts, Pieces, Tangents, can_be_kernel, steps_through
-from .layout import PAIRS
+from ..models import ESCAPE, AbstractField, AbstractForcedSystem, ScaledField, divide, multiply, require_speeds
+from .kernel import EXPLICIT, REVOLUTION, Parts, Pieces, Tangents, steps_through
+from .layout import IMPLICIT, PAIRS
 from .march import with_tangents
 from .outcomes import FINISHED, NOT_FINITE, OTHER, OUTCOMES, OUTSIDE, TOO_MANY
-from .solvers import ClassicalRK4, Rodas4
 
 
 FIRST_STEPS, MOST_STEPS = 64, 100_000
@@ -28,8 +32,6 @@ DEFAULT_TOLERANCE = 1e-6
 DEFAULT_ERROR = 3e-3
 """Largest error of a revolution, in units of the system's scale (for a cage: clearances)."""
 DEFAULT_PAIR = "tsit5"
-IMPLICIT = "rodas4"
-"""Method for lanes that take too many or too short steps with an explicit one."""
 FINER = 16.0
 """Factor by which `finer` divides tolerances."""
 
@@ -89,14 +91,12 @@ def _outcome_at(y: State, excursion: Scalar) -> Int[Array, ""]:
 class FixedSteps(AbstractMethod):
     """Method with equal steps, shortened near abrupt changes of the law; the strobe map is as smooth as the field."""
 
-    solver: dfx.AbstractSolver
+    solver: str = eqx.field(static=True)
+    """Name of the method, one of `EQUAL`."""
     steps: int | Int[Array, "*levels"]
     """Number of steps per revolution, an array if one program is to serve all numbers."""
 
     def __check_init__(self):
-        if not can_be_kernel(self.solver):
-            said = "must be `Rodas4`, or explicit with a last stage that is the first of the next step"
-            raise ArgumentError("solver", said=f"{said}, but is {type(self.solver).__name__}.")
         if isinstance(self.steps, int) and self.steps < 1:
             raise ArgumentError("steps", said=f"must be at least 1 per revolution, but {self.steps} was given.")
 
@@ -182,7 +182,7 @@ class NativeSteps(AbstractMethod):
 
     @property
     def in_jax(self) -> AdaptiveSteps:
-        return AdaptiveSteps(Rodas4() if self.pair == IMPLICIT else dfx.Tsit5(), self.tolerance)
+        return AdaptiveSteps(dfx.Kvaerno5() if self.pair == IMPLICIT else dfx.Tsit5(), self.tolerance)
 
     @property
     def reference(self) -> "NativeSteps":
@@ -207,25 +207,23 @@ class NativeSteps(AbstractMethod):
         )
 
 
-# `scan_kind="lax"`: outside `diffeqsolve`, diffrax's own solvers are differentiable in forward mode only with this.
-_SOLVERS: dict[str, dfx.AbstractAdaptiveSolver] = {
-    "rodas4": Rodas4(),
-    "rk4": ClassicalRK4(scan_kind="lax"),
-    "tsit5": dfx.Tsit5(scan_kind="lax"),
+EQUAL = (*EXPLICIT, IMPLICIT)
+"""Names of the methods with equal steps."""
+_ADAPTIVE: dict[str, dfx.AbstractAdaptiveSolver] = {
+    "tsit5": dfx.Tsit5(),
     "kvaerno3": dfx.Kvaerno3(),
     "kvaerno5": dfx.Kvaerno5(),
 }
-DEFAULT_SOLVER = "rk4"
 DEFAULT_STEPS = 1024
 
 
-def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: float | None = None) -> AbstractMethod:
-    """Integration method by name, with fixed or adaptive steps.
+def method(solver: str | None = None, steps: int | None = None, tolerance: float | None = None) -> AbstractMethod:
+    """Integration method by name, with equal or adaptive steps.
 
     **Arguments:**
 
-    - `solver`: `rk4` (classical), `rodas4` (ours, for stiff laws), `tsit5`, `kvaerno3`, `kvaerno5` (diffrax's, of which
-        the last two are for stiff laws and have adaptive steps only).
+    - `solver`: with equal steps `rk4` (classical, the default), `tsit5`, or `rodas4` for stiff laws; with a tolerance
+        diffrax's `tsit5` (the default) or, for stiff laws, `kvaerno3` and `kvaerno5`.
     - `steps`: equal steps per revolution, by default 1024.
     - `tolerance`: if given, steps are adaptive with this relative and absolute tolerance, the latter in units of the
         system's own scale.
@@ -233,18 +231,17 @@ def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: fl
     **Returns:** the `method` argument of other functions. **Raises:** `ValueError` for an unknown name, or both `steps`
     and `tolerance`.
     """
-    if solver not in _SOLVERS:
-        raise ArgumentError("solver", said=f"must be one of {', '.join(_SOLVERS)}, but '{solver}' was given.")
-    if tolerance is None and not can_be_kernel(_SOLVERS[solver]):
-        if steps is not None:
-            raise ArgumentError("steps", said=f"must not be given for {solver}, whose steps are adaptive: `tolerance`.")
-        tolerance = DEFAULT_TOLERANCE
+    if steps is not None and tolerance is not None:
+        raise ArgumentError("steps", "tolerance", said="must not both be given: steps are equal or adaptive.")
+    names = EQUAL if tolerance is None else tuple(_ADAPTIVE)
+    chosen = names[0] if solver is None else solver
+    if chosen not in names:
+        steps_are = "equal steps" if tolerance is None else "a tolerance"
+        raise ArgumentError("solver", said=f"must be one of {', '.join(names)} with {steps_are}, but is '{chosen}'.")
     if tolerance is None:
-        return FixedSteps(_SOLVERS[solver], DEFAULT_STEPS if steps is None else steps)
-    if steps is not None:
-        raise ArgumentError("steps", "tolerance", said="must not both be given: steps are fixed or adaptive.")
+        return FixedSteps(chosen, DEFAULT_STEPS if steps is None else steps)
     _require_tolerance(tolerance)
-    return AdaptiveSteps(_SOLVERS[solver], tolerance)
+    return AdaptiveSteps(_ADAPTIVE[chosen], tolerance)
 
 
 def _require_tolerance(tolerance: float) -> None:
@@ -271,3 +268,38 @@ def native(
     if pair not in PAIRS:
         raise ArgumentError("pair", said=f"must be one of {', '.join(PAIRS)}, but '{pair}' was given.")
     return NativeSteps(tolerance, error, pair)
+
+
+# --- the strobe map ---------------------------------------------------------------------------------------------------
+
+
+class StrobeMap(eqx.Module):
+    """The strobe map of a system at one speed, with everything that depends on the speed computed once."""
+
+    field: AbstractField
+    system: AbstractForcedSystem
+    scale: State
+    method: AbstractMethod
+
+    def __call__(self, y: State, tangents: Tangents = ()) -> Stretch:
+        """Advance by one revolution from `y`, with tangent vectors in units of the state, each with tangents of the
+        field's numbers or None."""
+        return self.part(y, 0, 1, tangents)
+
+    def part(self, y: State, i: Int[Array, ""] | int, parts: Parts, tangents: Tangents = ()) -> Stretch:
+        """Advance by the `i`-th of `parts` equal parts of a revolution."""
+        phase = jnp.asarray(i, dtype=float) * (REVOLUTION / jnp.asarray(parts, dtype=float))
+        return self.method.advance(Pieces(self.field, self.system, self.scale), y, phase, parts, tangents)
+
+
+def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod | None = None) -> StrobeMap:
+    """Strobe map of `system` at `speed` [rad/s].
+
+    **Arguments:** system; speed; integration method, by default the classical Runge-Kutta method with 1024 steps,
+    shortened near abrupt changes of the law.
+    """
+    require_x64()
+    require_speeds(system, speed)
+    chosen = FixedSteps("rk4", DEFAULT_STEPS) if method is None else method
+    speed = jnp.asarray(speed, dtype=float)
+    return StrobeMap(system.at_speed(speed), system, system.scale(speed), chosen)

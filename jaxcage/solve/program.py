@@ -113,6 +113,13 @@ def following(equations: Sequence[Any], given: Sequence[Any]) -> set[Any]:
     return found
 
 
+def depends(f: Callable[[Any], Any], x: Any) -> list[bool]:
+    """True for each array of f(x) that depends on x."""
+    jaxpr = jax.make_jaxpr(f)(x).jaxpr
+    reached = following(jaxpr.eqns, jaxpr.invars)
+    return [bool(reached & _variables([v])) for v in jaxpr.outvars]
+
+
 def needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
     """Equations on which the wanted variables depend, in their order."""
     reached = _variables(wanted)

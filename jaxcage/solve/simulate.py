@@ -12,15 +12,7 @@ from jaxtyping import Array, Float
 from .._arguments import require_at_least, require_x64, shown
 from .._errors import ArgumentError
 from .._pytrees import Scalar, State
-from ..models import (
-    INSTEAD,
-    AbstractForcedSystem,
-    BearingState,
-    bodies_of,
-    require_known,
-    require_speeds,
-    rollers_of,
-)
+from ..models import INSTEAD, AbstractForcedSystem, BearingState, bodies_of, require_known, require_speeds, rollers_of
 from ..quantities import notebook_html
 from .engine import CHUNK, RETRIES, Lanes, errors_of_parts, errors_of_stretches, has_implicit
 from .kernel import REVOLUTION
