@@ -103,5 +103,5 @@ def test_failures_are_no_knowledge():
 )
 def test_only_chaos_rattles(shares: dict[str, float], chaotic: int, begins: str, ends: str):
     speeds = np.array([900.0, 990.0])
-    said = range_sentence("A", None, Checked(speeds, 2, shares, 0, speeds[:chaotic], speeds[:chaotic], "tsit5"))
+    said = range_sentence("A", Checked(speeds, 2, shares, speeds[:chaotic], speeds[:chaotic], "tsit5"))
     assert said.startswith(begins) and said.endswith(ends)

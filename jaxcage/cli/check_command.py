@@ -49,7 +49,7 @@ def check(
         checked = d.check_design(subject.model, ends, progress=report_lanes)
         over = subject.over(*checked.speeds_rpm[[0, -1]] / RPM)
         document = {"verdict": checked.state, "checked": checked}
-        found = Answer(jc.show.range_sentence(over, None, checked), notes=[f"Checked: {checked}"], document=document)
+        found = Answer(jc.show.range_sentence(over, checked), notes=[f"Checked: {checked}"], document=document)
     model = 'The cage model prescribes the impacts of the rollers; slip and forces: a file with model = "bearing"'
     document = {"operating_rpm": [end * RPM for end in ends], **found.document}
     table, largest = _forces(subject, ends)
@@ -83,20 +83,22 @@ def chances(subject: Subject, speeds: Any, draws: int, seed: int, run: o.RunOpti
     draws = len(found.place)
     rows, over = d.indices(found, *outcomes), subject.over(*found.speed[[0, -1]])
     columns = subject.speed_columns(found.speed)
-    columns |= dict(zip(("chance of chaos", "lower", "upper"), (found.chance, *found.interval), strict=True))
+    columns |= dict(zip(("chance of chaos", "lower", "upper"), found.chance_of_chaos.T, strict=True))
     title = f"{subject.name}: chaotic share of {draws} draws, at each speed alone"
     figure = jc.show.drawn(partial(jc.show.chance_of_chaos, found), title=title)
     tables = [jc.show.chances_table(subject.name, found, subject.beside)]
     tables += [jc.show.indices_table(rows)] if rows and rows[0].telling else []
-    document = {"verdict": chance.state, "calm_share": chance.share, "calm_interval": chance.interval}
-    document |= {
-        "chaotic_draws": chance.chaotic,
-        "known_draws": chance.known,
-        "by_speed": jc.show.chances_document(found),
-    }
+    by_speed = [{"rpm": rpm, **_record(each)} for rpm, each in zip(found.rpm, found.chances, strict=True)]
+    document = _record(chance) | {"by_speed": by_speed}
     notes, files = [jc.show.indices_note(rows), *jc.show.chances_notes(found)], {"figure": figure, "data": columns}
-    said = jc.show.range_sentence(over, chance, None)
-    return Answer(said, tables, notes, document, files, jc.show.unknowns_notes(found), by_ranges=True)
+    said, details = jc.show.range_sentence(over, chance), jc.show.unknowns_notes(found)
+    return Answer(said, tables, notes, document, files, details, by_ranges=True)
+
+
+def _record(chance: Any) -> dict[str, Any]:
+    """A chance for a document."""
+    numbers = {"calm_share": chance.share, "calm_interval": chance.interval}
+    return {"verdict": chance.state, **numbers, "chaotic_draws": chance.chaotic, "known_draws": chance.known}
 
 
 def _with_rollers(subject: Subject, ends: tuple[float, float]) -> Answer:

@@ -21,19 +21,10 @@ from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
 from ..lanes import sobol
 from ..models import AbstractForcedSystem
-from .check import Checked, check_design
 from .design_space import DesignSpace, Value, function_value
 from .operating import KEPT, OperatingRange, UnstableWidth
-from .requirements import (
-    Budget,
-    Cost,
-    Requirement,
-    Requirements,
-    Tolerance,
-    cost_function,
-    listed,
-    widened,
-)
+from .requirements import Budget, Cost, Requirement, Requirements, Tolerance, cost_function, listed, widened
+from .verdict import Checked, check_design
 
 
 AT_BOUND = 1e-6  # distance from a bound, relative to the span, at which a parameter counts as at the bound

@@ -132,7 +132,7 @@ def optimum_figure(found: "Optimum", rows: Sequence["BeforeAfter"], title: str =
 def chance_of_chaos(found: "Ensemble", ax: Axes | None = None) -> Axes:
     """Diagram of the chance of chaos at each speed alone, with 95 % bars."""
     ax = style.axes_or_new(ax, 9.0, 4.2)
-    rpm, chance, (low, high) = found.rpm, found.chance, found.interval
+    rpm, (chance, low, high) = found.rpm, found.chance_of_chaos.T
     groups = {
         "at most 5 % of the draws are chaotic": (chance <= SURE, BLUE),
         "more": ((chance > SURE) & (chance < 1 - SURE), PURPLE),

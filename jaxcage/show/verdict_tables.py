@@ -10,7 +10,7 @@ import xarray as xr
 from .._parameters import parameter_info
 from ..analysis import ONE_ROLLER
 from ..bearing import listed_like, static_load_rating
-from ..design import Checked, Index, Margins, RangeChance
+from ..design import Chance, Checked, Index, Margins
 from .tables import OWN, UNIT, Beside, Column, Table, speed_columns, table
 
 
@@ -20,26 +20,25 @@ FAR = 0.3
 """Relative change of a parameter beyond which a first derivative is not extrapolated."""
 
 
-def range_sentence(over: str, chance: RangeChance | None, checked: Checked | None) -> str:
+def range_sentence(over: str, found: Chance | Checked) -> str:
     """Sentence of the verdict, from draws of the unknowns or from simulations of a known design."""
-    if chance is not None:
-        low, high = chance.interval
-        share = f"{100 * chance.share:.0f} %" if chance.known else "unknown"
-        words = {"calm": "Calm", "rattles": "The cage rattles", "not decided": "Not decided"}[chance.state]
+    if isinstance(found, Chance):
+        low, high = found.interval
+        share = f"{100 * found.share:.0f} %" if found.known else "unknown"
+        words = {"calm": "Calm", "rattles": "The cage rattles", "not decided": "Not decided"}[found.state]
         bars = f"95 % interval {100 * low:.0f} to {100 * high:.0f} %"
         return f"{words}: over {over} the cage is calm with probability {share} ({bars})."
-    assert checked is not None
-    if checked.calm:
-        return f"Calm: over {over} all {checked.initial_states} initial states end on the calm motion at every speed."
-    share, lost = (100 * checked.shares.get(label, 0.0) for label in ("periodic-1", "failed"))
+    if found.calm:
+        return f"Calm: over {over} all {found.initial_states} initial states end on the calm motion at every speed."
+    share, lost = (100 * found.shares.get(label, 0.0) for label in ("periodic-1", "failed"))
     failures = f", and {lost:.1f} % failed" if lost else ""
-    if checked.state == "not decided":
+    if found.state == "not decided":
         return f"Not decided: over {over} {share:.1f} % of the simulations end calm{failures}."
-    everywhere = checked.chaotic_rpm.size == checked.speeds_rpm.size
+    everywhere = found.chaotic_rpm.size == found.speeds_rpm.size
     if share == 0 and everywhere:
         return f"The cage rattles: over {over} no simulation ends on a calm motion{failures}."
     where = "at every speed" if everywhere else "at some speeds"
-    where = f"and chaos is seen {where}" if checked.chaotic_rpm.size else "the others on other motions"
+    where = f"and chaos is seen {where}" if found.chaotic_rpm.size else "the others on other motions"
     return f"Not calm from every initial state: over {over} {share:.1f} % end calm, {where}{failures}."
 
 
