@@ -140,11 +140,10 @@ def _calm_design(
     what = {"cost": "Cost", "width": "Width of the unstable ranges [rpm]"}[calm.objective]
     notes = [*notes, f"{what}: {best.cost_before:.4g} before, {best.cost:.4g} after"]
     notes += [f"10 % stricter {name}: costs {price:.2g} more" for name, price in jc.show.stricter(best).items()]
-    notes += [f"A further step would lose an edge: {best.stopped_by}"] if best.stopped_by else []
     notes += [f"On the way: {note}" for note in best.notes]
     notes += [] if best.checked is None else [f"Checked: {best.checked} ({best.checked.method})"]
     notes.append(f"Designs solved for: {best.evaluations}")
-    names = ("verdict", "checked", "cost", "cost_before", "prices", "conflict", "at_bound", "stopped_by")
+    names = ("verdict", "checked", "cost", "cost_before", "prices", "conflict", "at_bound")
     document = {"optimum": best.values, "vary": bounds} | {name: getattr(best, name) for name in names}
     document["operating_rpm"] = ends = low * RPM, high * RPM
     said = _calm_sentence(best, subject.over(low, high), calm.objective)
@@ -198,7 +197,7 @@ def sensitivity(
         known = jc.parameters(model)
         directions = [x for x in d.DIRECTIONS if all(float(known[each]) for each in x.split("+"))]
         length = means.length(discard=10, revolutions=20)
-        near = d.Runs(runs.speeds, initial_states=2, **length, blocks=2, exponents=0, tolerance=1e-4)
+        near = d.Runs(runs.speed, initial_states=2, **length, blocks=2, exponents=0, tolerance=1e-4)
         spread = float(np.clip(tolerance / 100, 0.05, 0.3))
         found = d.mean_gradient(model, near, {of: value}, directions=directions, spread=spread, seed=seed)
         slopes = [(found.statistics[of], directions)]
@@ -215,11 +214,10 @@ def sensitivity(
     said = "These samples do not tell which parameter matters most." if most in shares.doubtful else said
     tables = [jc.show.sobol_table(f"{what.capitalize()} of {name}", shares)]
     tables += [jc.show.budget_table(budget, tolerance) for budget in budgets]
-    notes = [shares.warning] if shares.warning else []
+    notes = [f"Too few samples to believe: {', '.join(shares.doubtful)}"] if shares.doubtful else []
     if shares.scatter:
         scatter = f"Scatter of the motion is {100 * shares.scatter:.0f} % of the variance"
         notes.append(f"{scatter}, in no parameter's own share.")
-    notes += [f"Within twice the error, no effect: {', '.join(b.unclear)}" for b in budgets if b.unclear]
     document = {"vary": bounds, "of": what, "tolerance_percent": tolerance, "designs": shares.evaluations}
     document |= {"doubtful": shares.doubtful, "scatter": shares.scatter, "budgets": budgets}
     return Answer(said, tables, notes, document, files)

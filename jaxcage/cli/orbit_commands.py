@@ -132,7 +132,6 @@ def gradient(
     zone: o.FromZero = 0,
     by: tuple[str, ...] = (),
     designs: o.FromTwo = 64,
-    chaos: bool = False,
     seed: o.Seed = 0,
     means: o.MeanOptions = o.MeanOptions(),
     steps: o.StepOptions = o.StepOptions(),
@@ -148,12 +147,11 @@ def gradient(
         zone: With --lasting: number of the zone, as `jaxcage sweep` counts them; 0 takes all.
         by: With --lasting or --speed: parameters; those joined by + change together.
         designs: With --lasting or --speed: number of designs around this one from which slopes are estimated.
-        chaos: With --speed: the mean slope of the largest Lyapunov exponent as well.
     """
     model, method, name = subject.model, steps.method, subject.name
     given: dict[str, Any] = {"designs": designs, "seed": seed}
     if subject.with_rollers:
-        return _of_means(subject, means, steps.tolerance or 1e-4, chaos, by or jc.design.DIRECTIONS, given)
+        return _of_means(subject, means, steps.tolerance or 1e-4, by or jc.design.DIRECTIONS, given)
     if means.speed is not None:
         raise InputError(f"Option --speed goes with a bearing with its rollers, but {name} is a cage.")
     if lasting:
@@ -218,26 +216,18 @@ def _of_lasting(subject: Subject, over: o.Range, zone: int, names: tuple[str, ..
 
 
 def _of_means(
-    subject: Subject,
-    means: o.MeanOptions,
-    tolerance: float,
-    chaos: bool,
-    directions: tuple[str, ...],
-    given: dict[str, Any],
+    subject: Subject, means: o.MeanOptions, tolerance: float, directions: tuple[str, ...], given: dict[str, Any]
 ) -> Answer:
     """Derivatives of the means of runs at one speed, from pairs of designs around the given one."""
     at, length = subject.speed(means.speed), means.length(initial_states=2, discard=20, revolutions=40)
     told = {"tolerance": tolerance, "progress": partial(report, "designs")}
-    runs = jc.design.Runs(at, **length, blocks=2, exponents=int(chaos), **told)
-    statistics = (*jc.design.STATISTICS, *(["exponent"] if chaos else []))
-    found = jc.design.mean_gradient(subject.model, runs, statistics, directions=directions, **given)
+    runs = jc.design.Runs(at, **length, blocks=2, exponents=0, **told)
+    found = jc.design.mean_gradient(subject.model, runs, directions=directions, **given)
     title, each = f"{subject.name}, {subject.at(at)}", found.statistics.items()
     by = [(abs(x), n, d, x) for n, g in each for d, x in zip(g.directions, g.elasticity) if np.isfinite(x)]
     _, name, direction, most = max(by, default=(0.0, "nothing", "any parameter", 0.0))
     said = f"1 % more {direction.replace('_', ' ')} changes {name} by {most:+.2f} %, the largest of all elasticities."
     notes = [f"{found.pairs} pairs of designs; failed: {found.failed} designs; inaccurate: {found.inaccurate} lanes"]
-    if drifting := [n for n, g in each if not g.settled]:
-        notes.append(f"Not settled, so that more --discard may change it: {', '.join(drifting)}")
     if absent := [n for n, g in each if not np.any(g.value)]:
         notes.append(f"Zero in every run: {', '.join(absent)}")
     document = subject.both(at) | length | {n: getattr(found, n) for n in ("pairs", "failed", "inaccurate")}

@@ -16,7 +16,6 @@ from .._errors import Stop
 
 FILES_ARE_WHOLE = "files of earlier runs are as they were, and the same command starts over"
 SECONDS_BETWEEN_LINES = 10.0
-SECONDS_TO_ESTIMATE = 3.0
 ENDS = (signal.SIGINT, signal.SIGTERM)
 """Signals by which a command is told to end."""
 LISTENS = 5.0
@@ -134,7 +133,7 @@ def _on_interruption(number: int, frame: FrameType | None) -> None:
 
 @contextlib.contextmanager
 def progress(text: str) -> Iterator[None]:
-    """Around a computation: a bar in a terminal, a line every ten seconds elsewhere, and how long a stage takes."""
+    """Around a computation: a bar in a terminal, elsewhere a line every ten seconds."""
     global _computes, _stops, _stopped, _report
     advise(FILES_ARE_WHOLE)
     _computes, _stops, _stopped = True, False, False
@@ -147,29 +146,21 @@ def progress(text: str) -> Iterator[None]:
 
 
 def _timed(text: str, bar: Report | None) -> Report:
-    """Report that says once for each stage of more than a minute how long it takes, from its rate since the first
-    change of what is done; without a bar, also lines with what is done."""
-    stage, last, first, began, told, said = "", 0, 0, math.nan, False, time.monotonic()
+    """Report that moves the bar or, without one, prints lines with what is done and the time that the rest takes, from
+    the rate since the stage began."""
+    stage, first, began, said = "", 0, math.nan, time.monotonic()
 
     def report(what: str, done: int, total: int) -> None:
-        nonlocal stage, last, first, began, told, said
+        nonlocal stage, first, began, said
         now = time.monotonic()
-        if what != stage or done < last:
-            stage, began, told = what, math.nan, False
-        elif math.isnan(began) and done > last:
-            first, began = done, now
-        last = done
-        left = (total - done) * (now - began) / (done - first) / 60 if done > max(first, 0) else math.nan
-        if not told and now - began > SECONDS_TO_ESTIMATE and not math.isnan(left):
-            told = True
-            if left > 1:
-                said = now
-                say(f"{text}, {what}: about {left:.0f} min for all {total}")
+        if what != stage:
+            stage, first, began = what, done, now
         if bar is not None:
             bar(what, done, total)
         elif now - said >= SECONDS_BETWEEN_LINES:
             said = now
-            say(f"{text}, {what}: {done} of {total}{'' if math.isnan(left) else f', {left:.1f} min left'}")
+            left = f", {(total - done) * (now - began) / (done - first) / 60:.1f} min left" if done > first else ""
+            say(f"{text}, {what}: {done} of {total}{left}")
 
     return report
 

@@ -31,7 +31,6 @@ AT_BOUND = 1e-6  # distance from a bound, relative to the span, at which a param
 WIDEST = 4.0  # largest multiple of a tolerance that is tried
 LOST = 10.0  # violation of every requirement at a trial without values
 ACTIVE = 5e-3  # slack below which a requirement counts as active
-NEAR_STOP = 0.03  # distance, relative to the spans, within which a trial that lost an edge limits the design
 ITERATIONS, ACCURACY = 30, 1e-4
 FIRST_RADIUS, LARGEST_RADIUS, LEAST_RADIUS = 0.1, 0.4, 2e-3  # trust region, relative to the spans
 PENALTY = 10.0  # penalty of a violation by 1, relative to the cost of the given design
@@ -62,8 +61,7 @@ class Design:
         prevent a feasible design, empty if there is one.
     - `prices`: cost of one unit more of each binding requirement (Lagrange multipliers).
     - `at_bound`: parameters at a bound; `worst`: value of each requirement for the worst bearing within the tolerances.
-    - `stopped_by`: reason why a nearby design lost an edge, empty if none did; `notes`: edges that were replaced.
-    - `budget`: admissible width of each tolerance.
+    - `notes`: edges that were replaced; `budget`: admissible width of each tolerance.
     - `evaluations`: number of designs whose edges were solved for; `checked`: simulations from many initial states.
     """
 
@@ -81,7 +79,6 @@ class Design:
     at_bound: tuple[str, ...]
     worst: dict[str, Value]
     budget: list[Budget]
-    stopped_by: str
     notes: tuple[str, ...]
     evaluations: int
     path: list[dict[str, float]]
@@ -441,7 +438,6 @@ def _described(problem: Problem, best: np.ndarray, checked: Checked | None) -> D
     trial, own, x = problem.at(best), problem.at(space.place), best[problem.free]
     names = np.array(space.names)[problem.free].tolist()
     slack, prices, conflict = trial.slack, dict[str, float](), tuple[str, ...]()
-    near = [t for t in problem.trials.values() if t.lost and float(np.max(np.abs(t.place - best))) < NEAR_STOP]
     feasible = not trial.lost and bool(np.all(slack >= -KEPT))
     if feasible:
         binding = np.flatnonzero(slack < ACTIVE)
@@ -465,7 +461,6 @@ def _described(problem: Problem, best: np.ndarray, checked: Checked | None) -> D
         at_bound=tuple(n for n, v in zip(names, x, strict=True) if min(v, 1 - v) < AT_BOUND),
         worst=trial.worst,
         budget=_budget(problem, trial) if wanted and feasible else [],
-        stopped_by=near[-1].lost if near else "",
         notes=tuple(dict.fromkeys(problem.range.handed_over)),
         evaluations=problem.evaluations,
         path=[space.values(t.place) | {"cost": t.cost} for t in problem.trials.values() if not t.lost],

@@ -92,9 +92,8 @@ def statistic_bars(found: "MeanGradient", title: str = "") -> Figure:
 
     def bars(ax: Axes, each: Any, colour: str) -> None:
         _bars_with_errors(ax, names, each.elasticity, each.elasticity_error, [colour] * len(names))
-        drifts = "" if each.settled else ", not settled"
         head = f"{readable(head_of(each.name, each.unit))}: {each.value:.3g}{f' {each.unit}' * (each.unit != '1')}"
-        ax.set_title(f"{head}{drifts}", fontsize=9, loc="left")
+        ax.set_title(head, fontsize=9, loc="left")
         ax.set_xlabel("Elasticity, with two standard errors", fontsize=9)
 
     draw = [partial(bars, each=each, colour=colour) for each, colour in zip(shown, cycle(EDGE_COLOURS), strict=False)]
