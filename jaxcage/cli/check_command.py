@@ -71,12 +71,9 @@ def at_best_guess(said: str) -> str:
 
 def chances(subject: Subject, speeds: Any, draws: int, seed: int, run: o.RunOptions = o.RunOptions()) -> Answer:
     """Answer on the probability that a cage with unknown values is calm at all speeds [rad/s], and on what would decide
-    it; the first of its tables is the one by speed. Draws run for at most 100 revolutions after 100."""
-    d, most = jc.design, jc.design.REVOLUTIONS
-    given = {"discard": run.discard, "revolutions": run.revolutions}
-    length: dict[str, Any] = {name: most if x is None else min(x, most) for name, x in given.items()}
-    length |= {"blocks": o.blocks_of(length["revolutions"]), "draws": draws, "seed": seed, "method": run.method}
-    found = d.ensemble(subject.model, subject.unknowns, speeds, **length, progress=partial(report_lanes, "draws"))
+    it; the first of its tables is the one by speed."""
+    d, told = jc.design, {"draws": draws, "seed": seed, "progress": partial(report_lanes, "draws")}
+    found = d.ensemble(subject.model, subject.unknowns, speeds, **told, **run.settings)
     if found.failed.all():
         raise NoResult(f"All {found.failed.size} simulations failed: try more steps (--steps), or narrower ranges.")
     chance, *outcomes = d.range_chance(found, found.rpm[0], found.rpm[-1])

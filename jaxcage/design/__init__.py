@@ -20,7 +20,6 @@ from .design_space import DesignSpace as DesignSpace, Value as Value
 from .operating import OperatingRange as OperatingRange
 from .optimiser import SEARCHES as SEARCHES, Design as Design, design_for as design_for
 from .requirements import (
-    COSTS as COSTS,
     Price as Price,
     Requirement as Requirement,
     Requirements as Requirements,
@@ -42,7 +41,6 @@ from .statistics import (
     CAGE_PARAMETERS as CAGE_PARAMETERS,
     COMPARED as COMPARED,
     OBJECTIVE as OBJECTIVE,
-    STATISTICS as STATISTICS,
     BeforeAfter as BeforeAfter,
     Runs as Runs,
     bearing_objective as bearing_objective,
@@ -62,7 +60,6 @@ from .survival_edges import (
 )
 from .unknowns import (
     RANGE_SPEEDS as RANGE_SPEEDS,
-    REVOLUTIONS as REVOLUTIONS,
     Chance as Chance,
     Ensemble as Ensemble,
     Index as Index,

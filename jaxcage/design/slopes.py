@@ -15,10 +15,11 @@ from jaxtyping import Float
 from .._arguments import require_at_least
 from .._errors import ArgumentError, InputError
 from .._parameters import parameters, replace
+from ..analysis import scatter
 from ..models import AbstractForcedSystem
 from ..orbits import Sensitivity
 from ..quantities import notebook_html
-from .statistics import STATISTICS, Runs, Statistic, mean_and_error, statistics_of
+from .statistics import STATISTICS, Runs, Statistic, statistics_of
 
 
 DIRECTIONS = (
@@ -228,10 +229,10 @@ def gradient_of_pairs(
     slopes = bread @ half
     left = half - moved @ slopes
     weighted = bread * (left / (1 - np.einsum("ij,ji->i", moved, bread)))  # HC3
-    value, error = mean_and_error(values.mean(axis=0))
+    each = values.mean(axis=0)
     covariance = np.zeros((1 + slopes.size,) * 2)
-    covariance[0, 0], covariance[1:, 1:] = error**2, weighted @ weighted.T
-    return Slopes(name, unit, value, directions, slopes, covariance)
+    covariance[0, 0], covariance[1:, 1:] = scatter(each) ** 2, weighted @ weighted.T
+    return Slopes(name, unit, float(each.mean()), directions, slopes, covariance)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -18,7 +18,7 @@ from scipy.special import expit
 
 from .._errors import ArgumentError
 from .._pytrees import compiled
-from ..analysis import CHAOS_THRESHOLD, LAND_LOADS, failed, land_loads
+from ..analysis import CHAOS_THRESHOLD, LAND_LOADS, failed, land_loads, scatter
 from ..lanes import Plan, Progress, Run, Speeds, run_lanes
 from ..models import AbstractForcedSystem, CageModel, drawn_places, rolling_start
 from .design_space import Models
@@ -99,7 +99,7 @@ class Runs:
 
     def run(self, models: Models) -> xr.Dataset:
         """Sweep of some designs."""
-        run = Run.of(models[0], confirm=False, horizon=0, **self.settings)
+        run = Run.of(models[0], **self.settings | {"confirm": False, "horizon": 0})
         if self.seed is None:
             plan = Plan.over_speed(list(models), self.speed, self.initial_states)
         else:
@@ -233,7 +233,7 @@ def bearing_objective(model: AbstractForcedSystem, runs: Runs, prices: Mapping[s
 @dataclasses.dataclass(frozen=True)
 class BeforeAfter:
     """Statistic of two designs from the same initial states, and its change, with standard errors from the scatter of
-    runs and of their differences; NaN for a single one."""
+    runs and of their differences; infinite for a single one."""
 
     name: str
     unit: str
@@ -274,12 +274,6 @@ def before_and_after(
         known = np.all(np.isfinite(values), axis=0)
         some = np.any(known, axis=0)
         a, b = (np.average(np.where(known, x, 0.0)[:, some], axis=0, weights=known[:, some]) for x in values)
-        numbers = [number for x in (a, b, b - a) for number in mean_and_error(x)]
+        numbers = [float(number) for x in (a, b, b - a) for number in (np.mean(x), scatter(x))]
         rows.append(BeforeAfter(name, each.unit, *numbers))
     return rows, int(failed(found).sum())
-
-
-def mean_and_error(x: Float[np.ndarray, " n"]) -> tuple[float, float]:
-    """Mean of independent numbers and its standard error; NaN for too few."""
-    mean = float(x.mean()) if x.size else math.nan
-    return mean, float(x.std(ddof=1) / math.sqrt(x.size)) if x.size > 1 else math.nan

@@ -24,9 +24,9 @@ from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
 from ..analysis import failed, motions, restless
 from ..files import Measurement, Range, Unknown, check_together
-from ..lanes import Progress, sobol
+from ..lanes import sobol
 from ..models import CageModel
-from ..solve import AbstractMethod, native
+from ..solve import native
 from .statistics import Runs
 
 
@@ -59,7 +59,7 @@ WHOLE = 0.9
 
 
 def _run_draws(
-    model: CageModel, unknowns: Sequence[Unknown], place: np.ndarray, speeds: Any, method: Any, **more: Any
+    model: CageModel, unknowns: Sequence[Unknown], place: np.ndarray, speeds: Any, **more: Any
 ) -> tuple[list[CageModel], xr.Dataset]:
     """Designs with the values at `place` in the ranges, and their sweep, each from its own conventional initial state:
     the cage of one design, at rest on its rib, would penetrate that of another."""
@@ -69,8 +69,9 @@ def _run_draws(
         models.append(replace(model, **values))
         check_together(models[-1])
     given: dict[str, Any] = {"discard": REVOLUTIONS, "revolutions": REVOLUTIONS, "blocks": 20, "keep": 32} | more
-    settled, method = SETTLED if given["discard"] >= SETTLED else 0, method or native(error=ERROR)
-    return models, Runs(speeds, settled=settled, method=method, **given).run(models)
+    given["method"] = given.get("method") or native(error=ERROR)
+    settled = SETTLED if given["discard"] >= SETTLED else 0
+    return models, Runs(speeds, settled=settled, **given).run(models)
 
 
 def _require_some(unknowns: Sequence[Unknown]) -> None:
@@ -120,13 +121,12 @@ class Chance(NamedTuple):
 
 class Index(NamedTuple):
     """First-order index of an unknown value: the share of the variance of an outcome that it explains alone, with its
-    standard error; how to measure it; mean outcome in the lowest and highest quarter of its range."""
+    standard error; how to measure it."""
 
     label: str
     share: float
     error: float
     source: str
-    quarters: tuple[float, float]
 
     @property
     def telling(self) -> bool:
@@ -189,8 +189,7 @@ def indices(found: Ensemble, outcome: Shaped[np.ndarray, " draws"], known: Bool[
     picks = np.random.default_rng(0).integers(len(y), size=(RESAMPLED, len(y)))
     for unknown, place, source in zip(found.unknowns, found.place[known].T, found.sources, strict=True):
         error = float(np.std([_explained(place[p], y[p]) for p in picks]))
-        quarters = float(y[place < 0.25].mean()), float(y[place > 0.75].mean())
-        rows.append(Index(unknown.label, _explained(place, y), error, source, quarters))
+        rows.append(Index(unknown.label, _explained(place, y), error, source))
     return sorted(rows, key=lambda row: -row.share)
 
 
@@ -210,27 +209,24 @@ def ensemble(
     *,
     draws: int = 64,
     seed: int = 0,
-    discard: int = REVOLUTIONS,
-    revolutions: int = REVOLUTIONS,
-    method: AbstractMethod | None = None,
-    **more: Any,
+    **settings: Any,
 ) -> Ensemble:
     """Run `draws` designs, spread evenly over the ranges, over speed.
 
     **Arguments:** design; its unknowns; ascending speeds [rad/s]; number and seed of the draws (scrambled Sobol
-    points); revolutions discarded and observed; method; more settings of `Runs`.
+    points); settings of `Runs`, by default with 100 revolutions discarded and 100 observed.
 
     **Raises:** `ValueError` if nothing is unknown, nothing is drawn, or values from the ranges are not compatible.
     """
     _require_some(unknowns)
     require_at_least(1, draws=draws)
     place, info = sobol(len(unknowns), draws, seed), parameter_info(model)
-    more |= {"discard": discard, "revolutions": revolutions}
-    _, found = _run_draws(model, unknowns, place, speeds, method, **more)
+    _, found = _run_draws(model, unknowns, place, speeds, **settings)
     place = place[: found.sizes["design"]]  # fewer after a stop
     rough, lost, at = restless(found), failed(found)[..., 0], np.asarray(speeds, dtype=float)
     sources, units = zip(*((info[u.names[0]].source, info[u.names[0]].unit) for u in unknowns), strict=True)
-    return Ensemble(tuple(unknowns), sources, place, at, rough, lost, discard, revolutions, units)
+    length = found.attrs["discard"], found.attrs["revolutions"]
+    return Ensemble(tuple(unknowns), sources, place, at, rough, lost, *length, units)
 
 
 # --- measurements ---------------------------------------------------------------------------------------------------
@@ -320,14 +316,12 @@ def misses(
     unknowns: Sequence[Unknown],
     measured: Sequence[Measurement],
     place: Float[np.ndarray, "draws unknowns"],
-    *,
-    method: AbstractMethod | None = None,
-    progress: Progress | None = None,
+    **settings: Any,
 ) -> Float[np.ndarray, "draws measurements"]:
     """Distance of each draw from each measurement, in tolerances; NaN where it failed. For the motions `rattles`
-    (chaos) and `calm` it is 0 if the draw agrees, else `FAR`."""
+    (chaos) and `calm` it is 0 if the draw agrees, else `FAR`. Settings are those of `Runs`."""
     rpm = np.unique([m.cage_rpm for m in measured])
-    models, found = _run_draws(model, unknowns, place, rpm * np.pi / 30, method, progress=progress)
+    models, found = _run_draws(model, unknowns, place, rpm * np.pi / 30, **settings)
     size, order = motions(models, found, method=native(error=ERROR))
     columns = []
     for m in measured:

@@ -111,11 +111,9 @@ def forces_note(found: Mapping[str, Mapping[str, float]], unknown: Sequence[str]
 
 
 def indices_table(rows: Sequence[Index]) -> Table:
-    """Table of the values whose measurement would decide most, with the chance of rattling at the ends of their
-    ranges."""
-    shown = [{**r._asdict(), "low": r.quarters[0], "high": r.quarters[1]} for r in rows if r.telling]
+    """Table of the values whose measurement would decide most."""
+    shown = [row._asdict() for row in rows if row.telling]
     columns = [Column("value", "label"), Column("of the verdict", "share", shown="%", error="error", digits=0)]
-    columns += [Column(f"rattles in its {end} quarter", end, shown="%", digits=0) for end in ("low", "high")]
     title = "What would decide it: first-order indices of the unknown values"
     return table(title, shown[:MOST], columns, "indices")
 
