@@ -11,9 +11,8 @@ import jaxcage as jc
 from .._errors import ArgumentError, InputError, NoResult
 from . import options as o
 from .answer import Answer
-from .check_command import chances
 from .progress import report
-from .speed_commands import counted, said_of, swept, zone_notes
+from .speed_commands import chances, counted, said_of, swept, zone_notes
 from .subject import RPM, Subject
 
 
