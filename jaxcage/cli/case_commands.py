@@ -58,7 +58,6 @@ def check(
     *,
     operating: o.Operating,
     draws: o.Draws = 64,
-    seed: o.Seed = 0,
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
     """The verdict for an operating range: calm or not, with its probability and margin, and what to change first."""
@@ -75,7 +74,7 @@ def check(
     if not isinstance(margins, str) and margins.changes:
         tables.append(jc.show.changes_table(subject.model, margins))
     if subject.unknowns and draws:
-        found = chances(subject, np.linspace(*ends, d.RANGE_SPEEDS), draws, seed)
+        found = chances(subject, np.linspace(*ends, d.RANGE_SPEEDS), draws)
         by_speed, *decide = found.tables
         tables += [*decide, dataclasses.replace(by_speed, detail=True)]
     else:
@@ -159,7 +158,6 @@ def report(
     over: o.Range = o.Range(),
     operating: o.Operating = None,
     draws: o.Draws = 64,
-    seed: o.Seed = 0,
     quick: o.Quick = False,
     run: o.RunOptions = o.RunOptions(),
     show: o.ShowOptions = o.ShowOptions(),
@@ -168,12 +166,12 @@ def report(
     began, (low, high), name = time.perf_counter(), subject.ends(over), subject.name
     parts, words, at = [], ["jaxcage", "report", Path(subject.path).name or name], None
     if operating is not None:
-        parts.append(("Verdict", check(subject, operating=operating, draws=draws, seed=seed)))
+        parts.append(("Verdict", check(subject, operating=operating, draws=draws)))
         subject, at = subject.operating(operating)
         low, high = min(low, at[0]), max(high, at[1])
         words += ["--operating", f"{operating[0]:g}-{operating[1]:g} rpm {subject.speeds}"]
     elif subject.unknowns and draws:
-        parts.append(("Chances", chances(subject, subject.range(over, 40), draws, seed, run)))
+        parts.append(("Chances", chances(subject, subject.range(over, 40), draws, run)))
     if interrupted():
         return parts[0][1]
     count = over.count or subject.usual(126 if quick else 251, 5 if quick else 13)

@@ -109,7 +109,7 @@ def design(
     return Answer(said, tables, notes, document, {"figure": jc.show.optimum_figure(found, rows, subject.name)})
 
 
-def _runs(subject: Subject, over: o.Range, means: o.MeanOptions, seed: int, progress: Any = None) -> Any:
+def _runs(subject: Subject, over: o.Range, means: o.MeanOptions, seed: int = 0, progress: Any = None) -> Any:
     """Settings of the runs of designs; for a cage, over a range of speeds."""
     if subject.with_rollers:
         length = means.length(initial_states=4, discard=10, revolutions=20)
@@ -168,7 +168,6 @@ def sensitivity(
     of: str = "wear",
     samples: o.OptionalCount = None,
     tolerance: Annotated[float, o.number("lie between 0 and 100 percent", lambda x: 0 < x < 100)] = 5.0,
-    seed: o.Seed = 0,
     quick: o.Quick = False,
     means: o.MeanOptions = o.MeanOptions(),
     show: o.ShowOptions = o.ShowOptions(),
@@ -185,11 +184,10 @@ def sensitivity(
     d, model, name, bounds, files = jc.design, subject.model, subject.name, read_bounds(vary, subject), {}
     if of not in d.BEARING_MEASURES:
         raise InputError(f"Option --of must be one of {', '.join(d.BEARING_MEASURES)}, but '{of}' was given.")
-    runs, measured = _runs(subject, over, means, seed, partial(report, "designs")), d.BEARING_MEASURES[of]
+    runs, measured = _runs(subject, over, means, progress=partial(report, "designs")), d.BEARING_MEASURES[of]
     ends = runs.speed[0] * RPM, runs.speed[-1] * RPM
     value = d.statistic(model, measured) if subject.with_rollers else d.chaotic_width(*ends)
-    given = {"samples": samples or subject.usual(64, 32), "seed": seed}
-    shares = d.global_sensitivity(model, bounds, value.blocks(runs), **given)
+    shares = d.global_sensitivity(model, bounds, value.blocks(runs), samples=samples or subject.usual(64, 32))
     slopes: list[tuple[Any, Any]] = []
     if subject.with_rollers and not quick:
         known = jc.parameters(model)
@@ -197,7 +195,7 @@ def sensitivity(
         length = means.length(discard=10, revolutions=20)
         near = d.Runs(runs.speed, initial_states=2, **length, blocks=2, exponents=0, tolerance=1e-4)
         spread = float(np.clip(tolerance / 100, 0.05, 0.3))
-        found = d.mean_gradient(model, near, {of: value}, directions=directions, spread=spread, seed=seed)
+        found = d.mean_gradient(model, near, {of: value}, directions=directions, spread=spread)
         slopes = [(found.statistics[of], directions)]
         files["figure"] = jc.show.statistic_bars(found, f"{name}: elasticities")
     elif not quick:
@@ -232,7 +230,6 @@ def identify(
     measured: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="CSV")],
     *,
     draws: Annotated[int, o.count(16)] = 128,
-    seed: o.Seed = 0,
     steps: o.StepOptions = o.StepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
@@ -250,7 +247,7 @@ def identify(
     rows = jc.files.read_measurements(measured, subject.speeds, 1 / (subject.shaft or 1.0))
     told = {"method": steps.method, "progress": partial(report, "draws")}
     missed = lambda place: jc.design.misses(model, unknowns, rows, place, **told)
-    found = jc.design.narrow(unknowns, missed, draws=draws, seed=seed)
+    found = jc.design.narrow(unknowns, missed, draws=draws)
     table, info = jc.show.measured_table(found, rows, subject.beside), jc.parameter_info(model)
     document = {name: getattr(found, name) for name in ("draws", "stages", "accepted")}
     if not found.accepted:

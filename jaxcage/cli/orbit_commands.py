@@ -22,7 +22,6 @@ def zones(
     over: o.Range = o.Range(),
     load: o.Load = None,
     draws: o.Draws = 64,
-    seed: o.Seed = 0,
     quick: o.Quick = False,
     run: o.SweepOptions = o.SweepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
@@ -32,7 +31,7 @@ def zones(
     For a bearing with its rollers: ranges of speed with the same motion. For a file with ranges: chances of chaos.
     """
     if subject.unknowns and draws:
-        return chances(subject, subject.range(over, 40), draws, seed, run)
+        return chances(subject, subject.range(over, 40), draws, run)
     found, answer = swept(subject, subject.range(over, subject.usual(251, 13)), run)
     if subject.with_rollers:
         return answer
@@ -131,7 +130,6 @@ def gradient(
     zone: o.FromZero = 0,
     by: tuple[str, ...] = (),
     designs: o.FromTwo = 64,
-    seed: o.Seed = 0,
     means: o.MeanOptions = o.MeanOptions(),
     steps: o.StepOptions = o.StepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
@@ -148,7 +146,7 @@ def gradient(
         designs: With --lasting or --speed: number of designs around this one from which slopes are estimated.
     """
     model, method, name = subject.model, steps.method, subject.name
-    given: dict[str, Any] = {"designs": designs, "seed": seed}
+    given: dict[str, Any] = {"designs": designs}
     if subject.with_rollers:
         return _of_means(subject, means, steps.tolerance or 1e-4, by or jc.design.DIRECTIONS, given)
     if means.speed is not None:

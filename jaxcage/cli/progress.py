@@ -14,7 +14,6 @@ from typing import Any, TypeAlias
 from .._errors import Stop
 
 
-FILES_ARE_WHOLE = "files of earlier runs are as they were, and the same command starts over"
 SECONDS_BETWEEN_LINES = 10.0
 ENDS = (signal.SIGINT, signal.SIGTERM)
 """Signals by which a command is told to end."""
@@ -25,8 +24,6 @@ _SHOW_CURSOR_AND_CLEAR_LINE = "\x1b[?25h\r\x1b[2K"
 Report: TypeAlias = Callable[[str, int, int], None]
 """Takes what is being done, how much of it is done, and of how much."""
 _number: int = signal.SIGINT
-_advice = FILES_ARE_WHOLE
-"""Words for a user who interrupts."""
 _computes = _stops = _stopped = _ends = False
 """True during a computation, after it was asked to stop, after its lanes were stopped, and once the process ends."""
 _heard = -math.inf
@@ -57,12 +54,6 @@ def interrupted() -> bool:
 def ends() -> bool:
     """True once an interruption has been raised, which a library may turn into another exception."""
     return _ends
-
-
-def advise(text: str) -> None:
-    """Say something else than `FILES_ARE_WHOLE` to a user who interrupts this computation."""
-    global _advice
-    _advice = text
 
 
 def say(text: str) -> None:
@@ -108,7 +99,7 @@ def end_interrupted() -> int:
     for each in ENDS:
         if signal.getsignal(each) is _on_interruption:  # which Python would reset to the default while it ends
             signal.signal(each, signal.SIG_IGN)
-    say(f"Interrupted: {_advice}.")
+    say("Interrupted: files are whole, and the same command starts over or goes on from what is stored.")
     return 128 + _number
 
 
@@ -135,7 +126,6 @@ def _on_interruption(number: int, frame: FrameType | None) -> None:
 def progress(text: str) -> Iterator[None]:
     """Around a computation: a bar in a terminal, elsewhere a line every ten seconds."""
     global _computes, _stops, _stopped, _report
-    advise(FILES_ARE_WHOLE)
     _computes, _stops, _stopped = True, False, False
     try:
         with _bar(text) if sys.stderr.isatty() else contextlib.nullcontext(None) as bar:

@@ -102,30 +102,23 @@ class Design:
         return "\n".join(rows)
 
 
+@dataclasses.dataclass
 class Problem:
-    """Trials of one search, each computed once.
+    """Trials of one search, each computed once, and the values of each design whose edges were solved for."""
 
-    **Arguments:** operating range, or width of unstable ranges, which is then the cost; requirements; cost; mask of
-    what varies; tolerances.
-    """
-
-    def __init__(
-        self,
-        range_: OperatingRange | UnstableWidth,
-        wanted: list[Requirement],
-        cost: Callable[[Any], Any] | None,
-        free: np.ndarray,
-        tolerance: dict[str, Tolerance],
-    ):
-        self.space, self.operating, self.wanted, self.free = range_.space, range_.operating, wanted, free
-        self.range, self.cost, self.tolerance = range_, cost, tolerance
-        self.trials: dict[bytes, Trial] = {}
-        self.solved: dict[bytes, dict[str, Value] | str] = {}
+    range: OperatingRange | UnstableWidth
+    wanted: list[Requirement]
+    cost: Callable[[Any], Any] | None
+    """None for the width of the unstable ranges."""
+    free: np.ndarray
+    """True for parameters that vary."""
+    tolerance: dict[str, Tolerance]
+    trials: dict[bytes, Trial] = dataclasses.field(default_factory=dict)
+    solved: dict[bytes, dict[str, Value] | str] = dataclasses.field(default_factory=dict)
 
     @property
-    def evaluations(self) -> int:
-        """Number of designs whose edges were solved for."""
-        return len(self.solved)
+    def space(self) -> DesignSpace:
+        return self.range.space
 
     def at(self, place: np.ndarray) -> Trial:
         """Trial at a place, computed if need be."""
@@ -462,7 +455,7 @@ def _described(problem: Problem, best: np.ndarray, checked: Checked | None) -> D
         worst=trial.worst,
         budget=_budget(problem, trial) if wanted and feasible else [],
         notes=tuple(dict.fromkeys(problem.range.handed_over)),
-        evaluations=problem.evaluations,
+        evaluations=len(problem.solved),
         path=[space.values(t.place) | {"cost": t.cost} for t in problem.trials.values() if not t.lost],
         checked=checked,
     )
