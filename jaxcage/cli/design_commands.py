@@ -20,8 +20,6 @@ from .values import no_worse_balance, read_bounds, read_prices, read_tolerances
 
 DESIGNED = o.Range(4000.0, 27500.0)
 """Speeds at which designs of a cage are assessed, 48 of them by default."""
-WEIGHED = "wear", "force", "impulse", "power", "slip", "balance"
-"""Prices of a bearing with its rollers."""
 Vary = Annotated[
     o.Texts,
     tyro.conf.arg(
@@ -75,7 +73,7 @@ def design(
         return _calm_design(subject, bounds, calm, notes, search=search, seed=seed)
     if calm.operating is not None:
         raise InputError("Option --search surrogate goes without --operating, over --first to --last.")
-    prices = read_prices(price, subject.usual({"cost": 1e3}, dict.fromkeys(WEIGHED, 1.0)))
+    prices = read_prices(price, subject.usual({"cost": 1e3}, dict.fromkeys(d.TERMS, 1.0)))
     runs = _runs(subject, over, means, seed)
     if subject.with_rollers:
         objective, compared = d.bearing_objective(model, runs, prices), {}

@@ -48,7 +48,7 @@ FUNCTIONS: tuple[Callable[..., Answer], ...] = (
 COMMANDS = {function.__name__.rstrip("_"): function for function in FUNCTIONS}
 CALLED = {"directions": "by", "samples": "sample", "settle": "discard", "confirm": "no_confirm"}
 CALLED |= {"method": "solver", "centrifugal_force": "speed", "blocks": "revolutions", "store": "out"}
-CALLED |= {"x": "points", "y": "points", "film": "least_film", "balance": "grade"}
+CALLED |= {"x": "points", "y": "points", "film": "least_film", "balance": "grade", "prices": "price"}
 """Option that sets an argument of the library, where it has another name."""
 
 
@@ -96,7 +96,6 @@ def _run(call: functools.partial[Answer]) -> None:
     check_case(call.keywords["subject"], speeds)
     if "other" in call.keywords:
         check_case(call.keywords["other"], {})
-    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA writes pages about each program that it finds compiled
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells where it stores fonts if there is no home folder
     import jax
 

@@ -41,6 +41,7 @@ from .statistics import (
     CAGE_PARAMETERS as CAGE_PARAMETERS,
     COMPARED as COMPARED,
     OBJECTIVE as OBJECTIVE,
+    TERMS as TERMS,
     BeforeAfter as BeforeAfter,
     Runs as Runs,
     bearing_objective as bearing_objective,

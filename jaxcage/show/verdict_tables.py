@@ -194,11 +194,9 @@ SKIDS = 0.02
 def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float, slip: float | None = None) -> list[str]:
     """Notes that compare the load of a bearing [N] with the makers' rules, and these with a computed slip."""
     like, rating = listed_like(bearing), static_load_rating(bearing)
-    rules = [
-        ("C0/60, with C0 by ISO 76" if like is None else f"C0/60 of {like.designation}", like and like.static_rating)
-    ]
-    rules = [(words, (value or rating) / 60) for words, value in rules]
+    rules = [("C0/60, with C0 by ISO 76", rating / 60)]
     if like is not None:
+        rules = [(f"C0/60 of {like.designation}", (like.static_rating or rating) / 60)]
         usual, brass = like.minimum_loads(shaft_rpm)
         rules += [("SKF's rule, usual cage", usual), ("SKF's rule, one-piece brass cage", brass)]
     rules = [(words, value) for words, value in rules if math.isfinite(value)]
