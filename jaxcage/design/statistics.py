@@ -82,7 +82,8 @@ class Runs:
     def of_bearing(cls, speeds: Speeds, initial_states: Any = 4, **more: Any) -> "Runs":
         """Runs of a whole bearing in two blocks, from random positions of its cage; peaks are maxima of a block."""
         length = {"discard": 10, "revolutions": 20, "blocks": 2}
-        return cls(speeds, initial_states, **length | {"exponents": 0, "tolerance": 1e-4, "seed": 0} | more)
+        usual: dict[str, Any] = {**length, "exponents": 0, "tolerance": 1e-4, "seed": 0}
+        return cls(speeds, initial_states, **usual | more)
 
     def fresh(self, number: int = 1, initial_states: int = 8) -> "Runs":
         """Independent runs for a check: other random initial states, twice as many speeds elsewhere in the range, twice
