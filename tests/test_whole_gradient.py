@@ -37,7 +37,7 @@ def test_a_calm_bearing_by_closed_form_and_by_differences():
     for name in ("friction_power_W", "pocket_impulse_N_s"):
         each = found.statistics[name]
         np.testing.assert_allclose(each.elasticity, expected, atol=5e-4)
-        assert np.all(each.elasticity_error < 2e-4)
+        assert np.all(each.elasticity_error < 2e-4) and each.settled
     slip = found.statistics["cage_slip"]
     assert 1e-4 < slip.value < 1e-3
     for i, name in enumerate(CALM[:1]):
@@ -81,13 +81,17 @@ def test_errors_are_those_of_noise():
         curved = 300 * moved[:, 0] ** 2 + 200 * moved[:, 0] * moved[:, 1]
         sides = np.stack([7 + curved + side * moved @ true for side in (1, -1)])
         loud = np.linspace(0.5, 1.5, pairs)
-        noise = 0.02 * loud * rng.normal(size=(2, pairs, 2)).mean(axis=-1)
-        found.append(gradient_of_pairs("x", "1", ("a", "b", "c"), moved, sides + noise))
+        noise = 0.02 * loud[None, :, None] * rng.normal(size=(2, pairs, 2))
+        found.append(gradient_of_pairs("x", "1", ("a", "b", "c"), moved, sides[..., None] + noise))
     slopes = np.array([each.by_relative_change for each in found])
     errors = np.array([[each.change(name)[1] for name in "abc"] for each in found])
     np.testing.assert_allclose(slopes.mean(axis=0), true, atol=4 * slopes.std() / 20)
     np.testing.assert_allclose(errors.mean(axis=0), slopes.std(axis=0), rtol=0.12)
     assert np.mean(np.abs(slopes - true) < 2 * errors) == pytest.approx(0.94, abs=0.03)
+    moved = np.array([[0.05], [-0.05]] * 4)
+    sides = 7 + np.stack([moved[:, 0], -moved[:, 0]])
+    drifting = gradient_of_pairs("x", "1", ("a",), moved, np.stack([sides, sides + 1], axis=-1))
+    assert drifting.drift == pytest.approx(1) and not drifting.settled and found[0].settled
 
 
 @pytest.mark.parametrize(

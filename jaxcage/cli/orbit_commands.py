@@ -225,6 +225,8 @@ def _of_means(
     _, name, direction, most = max(by, default=(0.0, "nothing", "any parameter", 0.0))
     said = f"1 % more {direction.replace('_', ' ')} changes {name} by {most:+.2f} %, the largest of all elasticities."
     notes = [f"{found.pairs} pairs of designs; failed: {found.failed} designs; inaccurate: {found.inaccurate} lanes"]
+    if drifting := [n for n, g in each if not g.settled]:
+        notes.append(f"Not settled, so that more --discard may change it: {', '.join(drifting)}")
     if absent := [n for n, g in each if not np.any(g.value)]:
         notes.append(f"Zero in every run: {', '.join(absent)}")
     document = subject.both(at) | length | {n: getattr(found, n) for n in ("pairs", "failed", "inaccurate")}

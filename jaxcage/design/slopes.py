@@ -105,11 +105,25 @@ def _deviation(weight: np.ndarray, covariance: np.ndarray) -> float:
 
 
 @dataclasses.dataclass(frozen=True)
+class StatisticGradient(Slopes):
+    """Slopes of a statistic, the mean over all designs and initial states; `drift`, the last block's mean minus the
+    first's, and its error, NaN for one block."""
+
+    drift: float
+    drift_error: float
+
+    @property
+    def settled(self) -> bool:
+        """True if the drift is at most twice its error, or 1 % of the value."""
+        return abs(self.drift) <= max(2 * self.drift_error, 0.01 * abs(self.value))
+
+
+@dataclasses.dataclass(frozen=True)
 class MeanGradient:
     """Gradients of statistics around a design with some values [SI]: `pairs` of designs that finished, designs that
     `failed`, which are left out with their partners, and `inaccurate` lanes, which are included."""
 
-    statistics: dict[str, Slopes]
+    statistics: dict[str, StatisticGradient]
     values: dict[str, float]
     pairs: int
     failed: int
@@ -138,7 +152,7 @@ def mean_gradient(
 ) -> MeanGradient:
     """Gradients of statistics by parameters of the design, with standard errors.
 
-    **Arguments:** design; settings of the runs; statistics, by name or as a mapping;
+    **Arguments:** design; settings of the runs, in two blocks to see a drift; statistics, by name or as a mapping;
 
     - `directions`: parameters that are not 0; those joined by `+` change by the same factor.
     - `designs`: number of designs, even; each parameter is moved up in half of them and down in the others, by half of
@@ -165,13 +179,13 @@ def mean_gradient(
     moved = spread * _moves(designs // 2, len(directions), seed)
     boxed = moved_designs(model, values, np.concatenate([moved, -moved]), directions)
     swept = runs.run(boxed)
-    found = {name: each.samples(boxed, swept).mean(axis=(1, 2, 3)) for name, each in chosen.items()}
-    failed = ~np.all([np.isfinite(values) for values in found.values()], axis=0)
+    found = {name: each.samples(boxed, swept).mean(axis=(1, 2)) for name, each in chosen.items()}
+    failed = ~np.all([np.isfinite(blocks).all(axis=1) for blocks in found.values()], axis=0)
     whole = ~failed.reshape(2, -1).any(axis=0)
     if whole.sum() <= len(directions) + 1:
         said = f"must be more: only {whole.sum()} pairs came to their ends, for {len(directions)} slopes."
         raise ArgumentError("designs", said=said)
-    pairs = {name: values.reshape(2, -1)[:, whole] for name, values in found.items()}
+    pairs = {name: blocks.reshape(2, designs // 2, -1)[:, whole] for name, blocks in found.items()}
     about = int(whole.sum()), int(failed.sum()), int((swept["outcome"] == "inaccurate").sum())
     fit = lambda name: gradient_of_pairs(name, chosen[name].unit, tuple(directions), moved[whole], pairs[name])
     return MeanGradient({name: fit(name) for name in chosen}, values, *about)
@@ -217,22 +231,25 @@ def gradient_of_pairs(
     unit: str,
     directions: tuple[str, ...],
     moved: Float[np.ndarray, "pairs n"],
-    values: Float[np.ndarray, "2 pairs"],
-) -> Slopes:
+    blocks: Float[np.ndarray, "2 pairs blocks"],
+) -> StatisticGradient:
     """Slopes of a statistic by least squares, from mirrored pairs of designs.
 
     **Arguments:** name and unit of the statistic; names of the directions; relative changes of the first design of each
-    pair, those of the second being the opposite; the statistic of the first and of the second designs.
+    pair, those of the second being the opposite; the statistic of the first and of the second designs in each block.
     """
-    half = (values[0] - values[1]) / 2
+    both = blocks.mean(axis=-1)
+    half = (both[0] - both[1]) / 2
+    drift = (blocks[..., -1] - blocks[..., 0]).mean(axis=0) if blocks.shape[-1] > 1 else np.full(len(half), np.nan)
     bread = np.linalg.inv(moved.T @ moved) @ moved.T
     slopes = bread @ half
     left = half - moved @ slopes
     weighted = bread * (left / (1 - np.einsum("ij,ji->i", moved, bread)))  # HC3
-    each = values.mean(axis=0)
+    each = both.mean(axis=0)
     covariance = np.zeros((1 + slopes.size,) * 2)
     covariance[0, 0], covariance[1:, 1:] = scatter(each) ** 2, weighted @ weighted.T
-    return Slopes(name, unit, float(each.mean()), directions, slopes, covariance)
+    known = float(each.mean()), directions, slopes, covariance
+    return StatisticGradient(name, unit, *known, float(drift.mean()), float(scatter(drift)))
 
 
 @dataclasses.dataclass(frozen=True)

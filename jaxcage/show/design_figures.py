@@ -46,7 +46,8 @@ def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None
     thick, place = 0.8 / count, np.arange(len(names))
     for i, (s, colour) in enumerate(zip(sensitivities, cycle(EDGE_COLOURS), strict=False)):
         value = np.array([s.elasticity.get(name, np.nan) for name in names])
-        at, label = place + (i - (count - 1) / 2) * thick, f"{s.name} ({s.value_rpm:.0f} rpm)"
+        at = place + (i - (count - 1) / 2) * thick
+        label = f"{s.name} ({s.value_rpm:.0f} rpm{'' if s.trusted else ', not trusted'})"
         bars = ax.barh(at, value, height=0.9 * thick, color=colour, linewidth=0, label=label)
         ax.bar_label(bars, fmt="{:+.2g}", padding=3, fontsize=6, color=BLACK)
     _named_rows(ax, [readable(name) for name in names])
@@ -84,7 +85,7 @@ def statistic_bars(found: "MeanGradient", title: str = "") -> Figure:
     def bars(ax: Axes, each: Any, colour: str) -> None:
         _bars_with_errors(ax, names, each.elasticity, each.elasticity_error, [colour] * len(names))
         head = f"{readable(head_of(each.name, each.unit))}: {each.value:.3g}{f' {each.unit}' * (each.unit != '1')}"
-        ax.set_title(head, fontsize=9, loc="left")
+        ax.set_title(f"{head}{'' if each.settled else ', not settled'}", fontsize=9, loc="left")
         ax.set_xlabel("Elasticity, with two standard errors", fontsize=9)
 
     draw = [partial(bars, each=each, colour=colour) for each, colour in zip(shown, cycle(EDGE_COLOURS), strict=False)]
