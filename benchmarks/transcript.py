@@ -9,20 +9,19 @@ import tempfile
 import time
 
 
-COMMON = {"designation": '"NU1014"', "grade": "32", "temperature": '"55 degC"', "load": '"1.2 kN"'}
-CAGE = COMMON | {
-    "guidance_gap": '"0.25 mm +- 0.05 mm"',
+COMMON = {
+    "load": '"1.2 kN"',
     "eccentricity": '"G6.3 at 12000 rpm shaft"',
+    "bearing.designation": '"NU1014"',
+    "lubricant.grade": "32",
+    "lubricant.temperature": '"55 degC"',
+    "film.land_width": '"2.5 mm"',
 }
-BRASS = COMMON | {
-    "guidance_gap": '"0.25 mm"',
-    "eccentricity": '"G6.3 at 12000 rpm shaft"',
-    "land_width": '"2.5 mm"',
-    "rolling_coefficient": "1.12e-6",
-}
+CAGE = COMMON | {"guidance_gap": '"0.25 mm +- 0.05 mm"'}
+BRASS = COMMON | {"guidance_gap": '"0.25 mm"', "drag.rolling_coefficient": "1.12e-6"}
 PEEK = {"material": '"PEEK-GF30"'}
 INNER = {"guidance": '"inner"\ninner_land_diameter = "83.5 mm"'}
-"""Values that are edited in the templates; mass and bars of the cage follow from its material."""
+"""Values that are edited in the templates, with their tables; mass and bars of the cage follow from its material."""
 RANGE = "--operating '4000-14000 rpm shaft'"
 
 
@@ -36,9 +35,11 @@ def run(command: str, folder: str) -> None:
 
 def edit(source: str, path: pathlib.Path, values: dict[str, str]) -> None:
     """Write a file with other values, and print these."""
+    print(f"# edited in {path.name}:")
     for name, value in values.items():
-        source, count = re.subn(rf"^{name} = .*$", f"{name} = {value}", source, count=1, flags=re.M)
-        assert count, f"the template has no line that sets {name}"
+        key = name.split(".")[-1]
+        source, count = re.subn(rf"^{key} = .*$", f"{key} = {value}", source, count=1, flags=re.M)
+        assert count, f"the template has no line that sets {key}"
         print(f"{name} = {value}")
     path.write_text(source, encoding="utf-8")
     print(flush=True)
@@ -59,7 +60,7 @@ def main() -> None:
         brass = path("brass.toml").read_text(encoding="utf-8")
         run(f"jaxcage check brass.toml {RANGE}", folder)
         for name, values in (("peek", PEEK), ("inner", INNER)):
-            print(f"$ cp brass.toml {name}.toml  # and edit")
+            print(f"$ cp brass.toml {name}.toml")
             edit(brass, path(f"{name}.toml"), values)
             run(f"jaxcage check {name}.toml {RANGE}", folder)
         run("jaxcage simulate brass.toml --speed 12000 --revolutions 20", folder)

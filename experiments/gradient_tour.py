@@ -13,20 +13,13 @@
 # derivative of an equation, checks it against edges that are solved for anew, and shows why the derivative of a
 # simulation fails where the motion is chaotic. The cage is that of case 1a of the paper.
 
-# %% tags=["parameters"]
-REVOLUTIONS = 200  # along which the derivative of a simulation is followed
-GAPS = 9  # at which the edge is solved for
-
 # %%
-import jaxcage as jc  # before JAX, so that compiled programs are kept without remarks of XLA
-
-
-# isort: split
 import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
 
+import jaxcage as jc
 from jaxcage.show import elasticity_bars
 
 
@@ -34,6 +27,13 @@ jc.keep_compiled_programs()
 jc.enable_x64()
 model = jc.case("1a")
 gap = float(jc.parameters(model)["guidance_gap"])
+
+# %% [markdown]
+# ## Settings of this page
+
+# %% tags=["parameters"]
+GAPS = 9  # number of guidance gaps at which the edge is solved for
+REVOLUTIONS = 200  # length of the simulation that is differentiated
 
 # %% [markdown]
 # ## The edge
@@ -98,7 +98,8 @@ n = np.arange(1, REVOLUTIONS + 1)
 growing = slice(REVOLUTIONS // 4, None)
 rate = np.polyfit(n[growing], np.log(np.abs(chaotic[growing])), 1)[0]
 swept = jc.sweep(model, jc.rpm(11000.0), revolutions=2 * REVOLUTIONS)
-exponent, error = (float(swept[name].values[0, 0, 0]) for name in ("exponents", "standard_error"))
+first = swept.isel(speed=0, initial_state=0, exponent=0)
+exponent, error = first["exponents"].item(), first["standard_error"].item()
 print(f"the derivative grows by e^{rate:.2f} in a revolution; largest exponent {exponent:.2f} ± {2 * error:.2f}")
 
 figure, ax = plt.subplots(figsize=(7, 4), layout="constrained")

@@ -14,17 +14,11 @@
 # within 0.02 mm and whose eccentricity within 2 µm, at the lowest cost of turning and balancing. The edges solve
 # equations, so that their derivatives are exact, and the search needs few designs.
 
-# %% tags=["parameters"]
-GAPS = 9  # at which the edges are shown
-STATES = 16  # from which the chosen design is simulated at each speed
-
 # %%
-import jaxcage as jc  # before JAX, so that compiled programs are kept without remarks of XLA
-
-
-# isort: split
 import matplotlib.pyplot as plt
 import numpy as np
+
+import jaxcage as jc
 
 
 jc.keep_compiled_programs()
@@ -33,6 +27,13 @@ model = jc.case("1a")
 operating = tuple(jc.rpm(12500, 18000, 2))
 vary = {"guidance_gap": (0.35e-3, 0.65e-3), "eccentricity": (8e-6, 30e-6)}
 tolerance = {"guidance_gap": jc.Tolerance(-0.02e-3, 0.02e-3), "eccentricity": jc.Tolerance(-2e-6, 2e-6)}
+
+# %% [markdown]
+# ## Settings of this page
+
+# %% tags=["parameters"]
+GAPS = 9  # number of guidance gaps at which the edges are drawn
+STATES = 16  # initial states from which the chosen design is simulated at each speed
 
 # %% [markdown]
 # ## The stable range over the gap
@@ -65,8 +66,9 @@ plt.show()
 
 # %% [markdown]
 # ## The search
-# Every point is a design whose edges were solved for, also in the corners of its tolerances. Lines are of equal cost;
-# the cost is 2 as given.
+# The cost is the given gap over the gap, for turning, plus the given eccentricity over the eccentricity, for balancing:
+# 2 as given. Lines are of equal cost. Every point is a design whose edges were solved for, also in the corners of its
+# tolerances.
 
 # %%
 best = jc.design_for(model, operating, vary, tolerance=tolerance, check=STATES)
@@ -120,9 +122,15 @@ plt.show()
 # %% [markdown]
 # ## The answer
 # A stable orbit need not attract every initial state: the chosen design is therefore simulated, with other steps than
-# those of the search, and the last line says how often chaos was met and how soon it died out.
+# those of the search.
 
 # %%
 print(best)
 print("At a bound of the search:", ", ".join(best.at_bound) or "nothing")
-print("Checked:", best.checked)
+print("Simulated:", best.checked)
+
+# %% [markdown]
+# ## Conclusion
+# A gap of 0.65 mm, the widest allowed, and an eccentricity of 24.1 µm lower the cost from 2 to 1.65; the edges are 21 %
+# of speed below and 75 % above the range. The cage is not calm from every initial state: 63.5 % of the simulations end
+# calm, and the others meet chaos with a mean life of 74 to 702 revolutions.

@@ -13,17 +13,10 @@
 # simulated from three initial states at every speed between 6000 and 14 000 rpm. This page shows how to read an orbit
 # diagram, and compares the chaotic zones of the two. `jaxcage sweep 1a` covers the whole range of speed.
 
-# %% tags=["parameters"]
-SPEEDS = 81
-DISCARD, REVOLUTIONS = 200, 200  # revolutions before the first point of the diagram, and those shown
-
 # %%
-import jaxcage as jc  # before JAX, so that compiled programs are kept without remarks of XLA
-
-
-# isort: split
 import matplotlib.pyplot as plt
 
+import jaxcage as jc
 from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.show import exponent_strip, mark_published, orbit_diagram
 
@@ -31,6 +24,16 @@ from jaxcage.show import exponent_strip, mark_published, orbit_diagram
 jc.keep_compiled_programs()
 jc.enable_x64()
 names = ("1a", "1b")
+
+# %% [markdown]
+# ## Settings of this page
+
+# %% tags=["parameters"]
+SPEEDS = 81  # number of speeds from 6000 to 14 000 rpm
+DISCARD = 200  # revolutions before the first point of the diagram
+REVOLUTIONS = 200  # revolutions that the diagram shows
+
+# %%
 swept = jc.sweep(
     [jc.case(name) for name in names], jc.rpm(6000, 14000, SPEEDS), discard=DISCARD, revolutions=REVOLUTIONS
 )

@@ -14,17 +14,11 @@
 # result by solving for the edge in random bearings. A second measure, Sobol indices, needs no edge: it asks what
 # decides how much of the whole speed range is chaotic.
 
-# %% tags=["parameters"]
-BEARINGS = 40  # in which the edge is solved for
-SPEEDS, SAMPLES = 20, 128  # of the Sobol indices
-
 # %%
-import jaxcage as jc  # before JAX, so that compiled programs are kept without remarks of XLA
-
-
-# isort: split
 import matplotlib.pyplot as plt
 import numpy as np
+
+import jaxcage as jc
 
 
 jc.keep_compiled_programs()
@@ -32,6 +26,14 @@ jc.enable_x64()
 model = jc.case("2a")
 varied = ("guidance_gap", "eccentricity", "cage_mass", "amplitude", "land_width")
 now = {name: float(jc.parameters(model)[name]) for name in varied}
+
+# %% [markdown]
+# ## Settings of this page
+
+# %% tags=["parameters"]
+BEARINGS = 40  # number of random bearings in which the edge is solved for
+SPEEDS = 20  # number of speeds at which each design of the Sobol indices is simulated
+SAMPLES = 128  # number of base samples of the Sobol indices, each of which takes seven designs
 
 # %% [markdown]
 # ## To first order
@@ -56,7 +58,7 @@ for _ in range(BEARINGS):
     change = dict(zip(varied, rng.uniform(-0.05, 0.05, len(varied)), strict=True))
     made = jc.replace(model, **{name: now[name] * (1 + x) for name, x in change.items()})
     expected.append(exact.value_rpm * (1 + sum(exact.elasticity[name] * x for name, x in change.items())))
-    near = jc.orbits.Point(edge.kind, expected[-1] * np.pi / 30, exact.state)
+    near = jc.orbits.Point(edge.kind, jc.rpm(expected[-1]), exact.state)
     solved.append(jc.sensitivity(made, near).value_rpm)
 solved = np.array(solved)
 found = np.isfinite(solved)

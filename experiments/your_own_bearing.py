@@ -10,22 +10,15 @@
 # %% [markdown]
 # # Does the cage of your own bearing stay calm from 4000 to 14 000 rpm of the shaft?
 # A bearing is a TOML file. This page describes an NU1014 in an imagined machine, and asks whether its cage stays calm.
-# Four numbers in the file are known within a range only. The answer is therefore a chance, with an error.
-
-# %% tags=["parameters"]
-SPEEDS = 121  # of the orbit diagram
-DRAWS, AT = 128, 49  # of what is unknown, and speeds at which they are simulated
+# Ten numbers in the file are known within a range only. The answer is therefore a chance, with an error.
 
 # %%
-import jaxcage as jc  # before JAX, so that compiled programs are kept without remarks of XLA
-
-
-# isort: split
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 
+import jaxcage as jc
 from jaxcage.files import read_bearing
 from jaxcage.show import chance_of_chaos, load_bars, orbit_diagram
 
@@ -34,16 +27,26 @@ jc.keep_compiled_programs()
 jc.enable_x64()
 
 # %% [markdown]
+# ## Settings of this page
+
+# %% tags=["parameters"]
+SPEEDS = 121  # number of speeds in the orbit diagram
+DRAWS = 128  # number of draws from the ranges of the file
+AT = 49  # number of speeds at which each draw is simulated
+
+# %% [markdown]
 # ## The file
-# `jaxcage init my_bearing.toml` writes such a file to start from, with a comment for every line.
+# It is the file of `jaxcage init my_bearing.toml`, which has a comment for every line, with the values of this bearing:
+# gap, balance, load, designation, oil and land width. The other ranges are those of the template.
 
 # %%
 Path("out").mkdir(exist_ok=True)
 file = Path("out/my_bearing.toml")
 file.write_text("""
-guidance_gap = "0.25 mm"
+speeds = "shaft"
+guidance_gap = "0.25 mm +- 0.05 mm"
 eccentricity = "G6.3 at 12000 rpm shaft"
-cage_mass = "0.18 kg"
+material = "brass"
 load = "1.2 kN"
 clearance_reading = "radial"
 unbalance = "physical"
@@ -56,23 +59,23 @@ grade = 32
 temperature = "55 degC"
 
 [film]
-land_width = "1.45 mm"
+land_width = "2.5 mm"
 
 [contact]
-stiffness = "2.408e9 N/m^(10/9)"
-onset = "0.97"
+stiffness = "2.408e9 (2e8 .. 2e10) N/m^(10/9)"
+onset = "0.97 (0.9 .. 0.99)"
 restitution = "0.9991 (0.3 .. 1)"
 
 [support]
 stiffness = "1.394e5 (1e4 .. 1e6) N/m"
 damping = "1.661 (0.3 .. 30) N s/m"
-cubic_stiffness = "1.126e13 N/m^3"
-cross_stiffness = "1762 N/m"
+cubic_stiffness = "1.126e13 (1e11 .. 1e14) N/m^3"
+cross_stiffness = "1762 (-5e3 .. 5e3) N/m"
 
 [impact]
-kind = "synchronous"
-amplitude = "121.3 (5 .. 300) N"
-exponent = "1.483"
+kind = "from_bearing"
+approach_ratio = "2 (1 .. 4)"
+unmatched = "0.5 (0.03 .. 2.5)"
 """)
 bearing = read_bearing(file)
 model = bearing.model

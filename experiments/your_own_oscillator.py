@@ -13,19 +13,14 @@
 # in three lines. A sweep shows where it becomes chaotic. The cascade of period doublings that leads there gives the
 # force to many digits, and a derivative with respect to a parameter, which a scaling law checks.
 
-# %% tags=["parameters"]
-FORCES, DISCARD, REVOLUTIONS = 400, 300, 200  # of the sweep
-
 # %%
-import jaxcage as jc  # before JAX, so that compiled programs are kept without remarks of XLA
-
-
-# isort: split
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
+
+import jaxcage as jc
 
 
 jc.keep_compiled_programs()
@@ -50,6 +45,14 @@ SPEED = 1.2  # of the forcing
 method = jc.method("rodas4", steps=64)
 
 # %% [markdown]
+# ## Settings of this page
+
+# %% tags=["parameters"]
+FORCES = 400  # number of forces in the sweep
+DISCARD = 300  # revolutions before those that are shown
+REVOLUTIONS = 200  # revolutions that are shown
+
+# %% [markdown]
 # ## The first period doubling
 # An orbit in the right well is followed to the force at which its period doubles.
 
@@ -62,7 +65,7 @@ def doubling(system):
 
 
 first = doubling(oscillator(0.26))
-slope = eqx.filter_grad(lambda system: doubling(system).value)(oscillator(0.26))
+slope = jax.grad(lambda system: doubling(system).value)(oscillator(0.26))
 elasticity = float(slope.acceleration.cubic / first.value)
 print(f"the period doubles at a force of {float(first.value):.8f} ± {float(first.error):.0g}")
 print(f"elasticity with respect to the cubic term {elasticity:.8f}")

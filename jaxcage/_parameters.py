@@ -195,18 +195,18 @@ def parameter_paths(module: eqx.Module) -> dict[str, tuple[str, ...]]:
 
 
 def parameters(module: eqx.Module) -> dict[str, Array]:
-    """All differentiable parameters of `module` by name, in SI units.
+    """List the differentiable parameters of `module`, a model or a part of one.
 
-    **Raises:** `ValueError` for anything but a model.
+    **Returns:** values [SI] by name, as `replace` accepts them. **Raises:** `ValueError` for anything else.
     """
     _require_module(module)
     return {name: get(module, path) for name, path in parameter_paths(module).items()}
 
 
 def parameter_info(module: eqx.Module) -> dict[str, ParameterInfo]:
-    """Unit, range and description of every differentiable parameter of `module`, by name.
+    """Describe the differentiable parameters of `module`, a model or a part of one.
 
-    **Raises:** `ValueError` for anything but a model.
+    **Returns:** unit, range and description by name. **Raises:** `ValueError` for anything else.
     """
     _require_module(module)
     infos = {path: field.metadata["parameter"] for path, field in walk(module) if "parameter" in field.metadata}
@@ -260,13 +260,14 @@ def choice_paths(module: eqx.Module) -> dict[str, tuple[str, ...]]:
 
 
 def replace(module: M, **values: PyTree) -> M:
-    """Copy of `module` with named parameters or parts replaced.
+    """Copy a model with named parameters or parts replaced; `module` itself does not change.
 
-    **Arguments:** parameters by name in SI units, e.g. `replace(model, guidance_gap=0.5e-3)`; choices and counts by
-    dotted name through a dictionary, `replace(model, **{"film.model": "positive_pressure"})`; and whole parts of the
-    model, `replace(model, rib=ElasticRib(...))`, `replace(model, extra=(MyDrag(3.0),))`.
+    **Arguments:** a model or a part of one; parameters by name [SI], `replace(model, guidance_gap=0.5e-3)`; choices and
+    counts by dotted name through a dictionary, `replace(model, **{"film.model": "positive_pressure"})`; and whole parts
+    of the model, `replace(model, rib=ElasticRib(...))`, `replace(model, extra=(MyDrag(3.0),))`.
 
-    **Raises:** `ValueError` for an unknown name, a value out of its range, or an option that a choice does not offer.
+    **Returns:** the copy. **Raises:** `ValueError` for an unknown name, a value out of its range, or an option that a
+    choice does not offer.
     """
     _require_module(module)
     paths, fields = parameter_paths(module) | choice_paths(module), dict(walk(module))

@@ -31,7 +31,7 @@ REFUSED = [
     ("sweep 4z", "'4z'"),
     (f"sweep {'x' * 300}", "is unknown"),
     ("sweep nowhere.toml", "must be a readable TOML file"),
-    ("sweep 1a --sped 3", "--sped"),
+    ("sweep 1a --sped 3", "--sped, 3 (see jaxcage sweep --help)"),
     ("sweep 1a --first 0", "--first"),
     ("zones 1a --first 9000 --last 9000", "the range is 9000 to 9000 rpm"),
     ("sweep 1a --count 2.5", "--count"),

@@ -109,6 +109,18 @@ def test_a_configuration_file_in_place_of_a_case(capsys: pytest.CaptureFixture[s
     assert err == ""  # T = 0.3 mm > C_r = 0.28 mm: the design rule holds
 
 
+def test_estimated_values_are_printed(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """A gap of 0.5 mm is wider than the pocket clearance that is estimated for an NU 220, as the warning says."""
+    path = tmp_path / "mine.toml"
+    path.write_text('base = "1a"\nguidance_gap = "0.5 mm"\n[bearing]\ndesignation = "NU220"\n')
+    assert main(["statics", str(path), "--out", str(tmp_path)]) == 0
+    out, err = capsys.readouterr()
+    assert out.count("displacement of the cage") == 1  # for the guide that the file has, and no other
+    clearances = "bearing.radial_clearance = 67.5 µm, bearing.pocket_clearance = 0.4125 mm"  # 67.5: ISO 5753-1
+    assert f"{clearances}, bearing.effective_length = 22.5 mm" in out
+    assert "T is estimated: give pocket_clearance below [bearing]" in err
+
+
 def test_init_writes_a_new_file_only(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     path = tmp_path / "my_bearing.toml"
     assert document(capsys, "init", str(path)) == {"file": str(path)}

@@ -73,22 +73,21 @@ def test_wrong_files_are_refused_before_jax_is_loaded(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    "case, option, rpm",
+    "command, rpm",
     [
-        ("1a", '--speed "70000 rpm cage"', "62516"),  # 300 m/s/(91.65 mm/2)
-        ("nu2310", '--speed "160000 rpm shaft"', "62516"),  # whose cage turns at 65/162 of that
-        ("mine.toml", "--first 3000 --last 140000", "60153"),  # NU 1014: 300 m/s/(95.25 mm/2), of the shaft
+        ('poincare 1a --speed "70000 rpm cage"', "62516"),  # 300 m/s/(91.65 mm/2)
+        ('poincare nu2310 --speed "160000 rpm shaft"', "62516"),  # whose cage turns at 65/162 of that
+        ("sweep mine.toml --first 3000 --last 140000", "60153"),  # NU 1014: 300 m/s/(95.25 mm/2), of the shaft
+        ("check 1a --operating 4000-70000", "62516"),
+        ("design 1a --operating 4000-70000", "62516"),
     ],
 )
-def test_a_speed_at_which_no_cage_runs_is_refused_before_jax_is_loaded(
-    tmp_path: Path, case: str, option: str, rpm: str
-):
+def test_a_speed_at_which_no_cage_runs_is_refused_before_jax_is_loaded(tmp_path: Path, command: str, rpm: str):
     text = template(short=True).replace("NU2310", "NU1014")
     (tmp_path / "mine.toml").write_text(text)
-    command = shlex.split(f"{'sweep' if 'last' in option else 'poincare'} {case} {option}")
     code = "import sys; from jaxcage.cli import main; main(sys.argv[1:]); print('jax' in sys.modules)"
     ran = subprocess.run(
-        [sys.executable, "-c", code, *command], capture_output=True, text=True, check=True, cwd=tmp_path
+        [sys.executable, "-c", code, *shlex.split(command)], capture_output=True, text=True, check=True, cwd=tmp_path
     )
     assert ran.stdout == "False\n" and f"leave the cage at most {rpm} rpm, which is 300 m/s at its land" in ran.stderr
 

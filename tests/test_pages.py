@@ -38,8 +38,9 @@ def test_python_blocks_of_the_readme():
 
 @pytest.mark.wide
 @pytest.mark.parametrize("name", [name for name, page in PAGES.items() if "```python" in page])
-def test_python_blocks_of_the_pages(name: str):
-    """Each page runs by itself."""
+def test_python_blocks_of_the_pages(name: str, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
+    """Each page runs by itself, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
     space, _ = run_blocks(PAGES[name])
     PROMISED.get(name, lambda space: None)(space)
 

@@ -9,7 +9,7 @@ import pytest
 from helpers import document, is_png
 
 import jaxcage as jc
-from jaxcage.design import Chance, Ensemble, indices, misses, narrow, range_chance
+from jaxcage.design import Chance, Ensemble, ensemble, indices, misses, narrow, range_chance
 from jaxcage.files import (
     ConfigError,
     Measurement,
@@ -183,6 +183,14 @@ def test_a_cage_meets_its_own_measurements():
     own = [Measurement("orbit size", 12000.0, size, 1e-6), Measurement("whirl frequency", 12000.0, whirl, 1.0)]
     again = misses(model, (STIFF, HIT), own, place, method=method)
     assert np.all(again[0] <= 1e-6) and again[1, 0] > 1
+
+
+@pytest.mark.wide
+def test_draws_that_all_settle_early_are_calm():
+    wide = jc.replace(jc.case("1a"), clearance_reading="radial", unbalance="physical", land_width=4e-3)
+    stiff = Unknown("support.stiffness", ("stiffness_x", "stiffness_y"), Range(1e5, 1e6))
+    found = ensemble(wide, (stiff,), jc.rpm(2000, 3000, 2), draws=4, method=jc.method("rk4", steps=1024))
+    assert found.chaotic.shape == (4, 2) and not found.chaotic.any() and not found.failed.any()
 
 
 @pytest.mark.wide

@@ -1,10 +1,10 @@
-"""Labels of lanes: periodic, chaotic, quasi-periodic, undecided, failed or inaccurate.
+"""Labels of lanes: periodic, chaotic, quasi-periodic, undecided, failed or inaccurate; thresholds are constants.
 
 The rule, in this order: `inaccurate` and `failed` by the outcome; `periodic-k` if the strobe orbit closes after k
 revolutions; `chaotic` if the largest exponent is above 0.02 by two standard errors; `quasi-periodic` if it is zero
 within 0.005, two standard errors are below 0.005, and the strobe orbit neither shrinks nor grows; else `undecided`. A
 lane that closes although neighbouring trajectories diverge is undecided: its motion is too small for the scale, or it
-is on an unstable orbit.
+is on an unstable orbit. `lanes.dataset` makes a chaotic lane `transient` if it calms down before the horizon.
 """
 
 import numpy as np

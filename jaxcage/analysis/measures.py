@@ -50,7 +50,8 @@ def cage_history(model: CageModel, trajectory: Trajectory) -> CageHistory:
     position, velocity = (q, v) if dim == 4 else (q[:, :2] - q[:, 2:], v[:, :2] - v[:, 2:])
     motion = np.concatenate([position, velocity], axis=1)
     along = _forces(model, *map(jax.numpy.asarray, (trajectory.speed, trajectory.tau, motion)))
-    names = (*FORCES, *(type(law).__name__ for law in model.extra))  # compiled functions sort the keys of dictionaries
+    own, extra = [law.law_name for law in model.forces if law.law_name], [type(law).__name__ for law in model.extra]
+    names = dict.fromkeys([*own, *FORCES, *extra])  # compiled functions sort the keys of dictionaries
     return CageHistory(
         speed=trajectory.speed,
         phase=float(trajectory.tau[-1] - trajectory.tau[0]),
@@ -111,9 +112,14 @@ class Measures(dict[str, Measured]):
 
 
 def measures(model: AbstractForcedSystem, trajectory: Trajectory) -> Measures:
-    """Quantities of a time history, preferably of whole revolutions without the transient, that its model reports.
+    """Compute the quantities that a model reports of a time history.
 
-    **Raises:** `ValueError` for a trajectory that failed, or of fewer than 3 samples.
+    **Arguments:** a cage or a whole bearing; its trajectory, preferably of whole revolutions without the transient.
+
+    **Returns:** `Measures`, quantities [SI] by name, with their standard errors for a whole bearing.
+
+    **Raises:** `ValueError` for a trajectory that failed, or of fewer than 3 samples; `RuntimeError` without double
+    precision.
     """
     require_x64()
     allowed = ("successful", "inaccurate") if model.beside else ("successful",)

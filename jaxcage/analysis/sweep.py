@@ -112,7 +112,12 @@ def outcomes(found: xr.Dataset) -> dict[str, int]:
 
 
 def summary(found: xr.Dataset) -> str:
-    """Summary of a sweep in a few lines: lanes by label, uncertain labels, failures, accuracy."""
+    """Summarise a sweep in a few lines of text: lanes by label, uncertain labels, failures, accuracy.
+
+    **Arguments:** result of `sweep` or `label_map`. **Raises:** `ValueError` for another data set.
+    """
+    if "confirmed" not in found.attrs:
+        raise ArgumentError("found", said="must be the result of `jaxcage.sweep` or `jaxcage.label_map`.")
     labels: Shaped[np.ndarray, "*lanes"] = found["label"].values
     sizes = ", ".join(f"{n} {axis}{'s' * (n != 1)}" for axis, n in zip(found["label"].dims, labels.shape))
     rpm = found["rpm"].values

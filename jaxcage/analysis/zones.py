@@ -106,11 +106,11 @@ class Zones:
     transient: tuple[Zone, ...] = ()
     """Zones of chaos that dies out before the horizon, ascending."""
     horizon: int = 0
-    """Revolutions that chaos must last; 0 if lanes were not followed."""
+    """Revolutions that chaos must last, those of the run rounded up to blocks of 30; 0 if lanes were not followed."""
 
     def __str__(self) -> str:
-        lasting = f" of chaos that lasts beyond {self.horizon} revolutions" if self.horizon else ""
-        rows = [f"Chaotic zones{lasting}, at a resolution of {self.resolution_rpm:.0f} rpm"]
+        head = f"Zones of chaos that lasts beyond {self.horizon} revolutions" if self.horizon else "Chaotic zones"
+        rows = [f"{head}, at a resolution of {self.resolution_rpm:.0f} rpm"]
         rows += [f"  zone {i}: {_row(zone)}" for i, zone in enumerate(self.zones, start=1)] or ["  none"]
         if self.transient:
             rows += ["Transient chaos", *(f"  {_row(zone)}" for zone in self.transient)]
@@ -200,14 +200,14 @@ def _life(found: xr.Dataset, chaotic: np.ndarray, first: int, last: int) -> tupl
 
 
 def zones(sweep: xr.Dataset, close_below_rpm: float | None = None) -> Zones:
-    """Chaotic zones of a sweep, and the ranges in which the synchronous orbit was met.
+    """Find the chaotic zones of a sweep, and the ranges in which the synchronous orbit was met.
 
     A speed with at least one chaotic lane counts as transient if lanes were followed to a horizon that exceeds the mean
     life of chaos, else as chaotic. Speeds without a chaotic lane at which some lanes failed or were inaccurate are
     neither inside nor outside a zone, and the uncertainty of an edge next to them is the width of the gap.
 
-    **Arguments:** a sweep with at least one exponent; width of the windows to be closed [rpm], by default 500 rpm and
-    at most 5 % of the highest speed.
+    **Arguments:** result of `sweep` for one model, with at least one exponent; width of the windows to be closed [rpm],
+    by default 500 rpm and at most 5 % of the highest speed.
 
     **Returns:** `Zones`. Edges lie half way between neighbouring speeds. Their uncertainty is the spacing or, if
     larger, the distance to the first speed on either side at which the interval of the mean life (95 %) excludes the
@@ -263,7 +263,10 @@ class Stretch:
 
 
 def stretches(sweep: xr.Dataset) -> tuple[Stretch, ...]:
-    """Ascending stretches of speed with equal labels and sign of the exponent, accurate to half the spacing."""
+    """Find the stretches of speed with equal labels and sign of the exponent.
+
+    **Arguments:** result of `sweep`. **Returns:** stretches in ascending order, accurate to half the spacing of speeds.
+    """
     rpm, label = sweep["rpm"].values, sweep["label"].values
     kinds = [_kind(sweep, label, i) for i in range(rpm.size)]
     ends = [0, *(i for i in range(1, len(kinds)) if kinds[i] != kinds[i - 1]), len(kinds)]

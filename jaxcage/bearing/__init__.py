@@ -11,7 +11,7 @@
 | `catalogue` | bearings by designation with ratings and minimum loads; the published cases and figure axes |
 """
 
-from .._catalogue import (
+from .._bearing_data import (
     CageMaterial as CageMaterial,
     cage_material as cage_material,
     cage_materials as cage_materials,

@@ -9,7 +9,7 @@ import dataclasses
 import functools
 from typing import Any, NamedTuple
 
-from .._catalogue import designated, dimensions, estimated, rows
+from .._bearing_data import designated, dimensions, estimated, rows
 from .._errors import ArgumentError
 from .geometry import Bearing
 
@@ -27,7 +27,7 @@ class Listed(NamedTuple):
 
     Load ratings are in N, the reference and limiting speeds of the shaft in rpm. `k_r` is SKF's minimum load factor
     with the usual cage and with a one-piece brass cage, NaN where none is printed. `estimated` names the parameters
-    of `bearing` that no catalogue prints.
+    of `bearing` that are estimated.
     """
 
     designation: str

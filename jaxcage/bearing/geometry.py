@@ -38,7 +38,11 @@ def bearing_steel() -> Material:
 
 
 class Bearing(eqx.Module):
-    """A cylindrical roller bearing with its outer ring at rest and the shaft in its inner ring."""
+    """A cylindrical roller bearing with its outer ring at rest and the shaft in its inner ring.
+
+    **Arguments:** the fields, lengths in metres; `jaxcage.parameter_info(bearing)` has their units and ranges.
+    **Raises:** `ValueError` for dimensions that do not fit together.
+    """
 
     bore: Scalar = parameter("m", 1e-3, 2.0, "bore diameter", kind="catalogue")
     outside_diameter: Scalar = parameter("m", 1e-3, 4.0, "outside diameter", kind="catalogue")

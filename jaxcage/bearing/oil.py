@@ -26,7 +26,11 @@ THINNEST = 2e-6
 
 
 class Lubricant(eqx.Module):
-    """An oil given by its density and two points of its viscosity-temperature line."""
+    """An oil given by its density and two points of its viscosity-temperature line.
+
+    **Arguments:** the fields: density [kg/m^3], kinematic viscosities [m^2/s], temperatures [K]; `jaxcage.bearing.vg`
+    makes an oil by its grade. **Raises:** `ValueError` for points of one temperature, or that rise with it.
+    """
 
     density: Scalar = parameter("kg/m^3", 500.0, 2000.0, "density of the oil", kind="oil")
     viscosity_1: Scalar = parameter("m^2/s", 1e-6, 1e-1, "kinematic viscosity at temperature_1", kind="oil")

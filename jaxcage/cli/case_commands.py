@@ -48,8 +48,9 @@ def init(
     written = write_template(path, model, short=not full)
     what = "an NU2310 with its rollers" if model == "bearing" else "the cage of an NU2310"
     said = f"Written: {written}. It describes {what}: change the values and go on, e.g. with"
-    check = f'  jaxcage check {path} --operating "4000-14000 rpm shaft"'
-    commands = [check, *(f"  jaxcage {command} {path}" for command in ("statics", "sweep", "zones", "report"))]
+    operating, over = '--operating "4000-14000 rpm shaft"', "--first 4000 --last 14000"
+    options = {"check": operating, "statics": "--speed 14000", "sweep": over, "zones": over, "report": operating}
+    commands = [f"  jaxcage {command} {path} {given}" for command, given in options.items()]
     return Answer(said, notes=commands, document={"file": str(written)})
 
 

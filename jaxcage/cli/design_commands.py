@@ -47,7 +47,7 @@ def design(
     means: o.MeanOptions = o.MeanOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Cheapest design of a cage that is calm over an --operating range, with margins, by exact gradients.
+    """Cheapest cage whose synchronous orbit is stable over an --operating range, with margins, by exact gradients.
 
     Without that range: a search on simulations for fewer chaotic speeds or, for a bearing, less wear, forces and
     losses; its best design is compared with the given one by independent runs.

@@ -25,7 +25,7 @@ LARGEST = {"rpm": 1e6, "N": 1e7}
 SIDE = range(2, 10_001)
 """Allowed numbers of points along one side of a map."""
 EXAMPLES = {"rpm": '"900 rad/s" or "20000 rpm shaft"', "N": '"4.45 kN"'}
-TO = re.compile(r"\s*(?:-|–|\bto\b)\s*")
+TO = re.compile(r"\s*(?:-|–|\.\.|\bto\b)\s*")
 """Separates the ends of a range of speed."""
 
 
@@ -87,7 +87,7 @@ def read_range(given: str) -> tuple[float, ...]:
     except ValueError as error:
         raise ValueError(f'must be a range of speed such as "4000-14000 rpm shaft", but "{given}" {error}.') from None
     if not (len(found) == 2 and 0 < found[0] < found[1] < math.inf):
-        raise ValueError(f'must be one range of speed above 0 that grows, but "{given}" was given.')
+        raise ValueError(f'must be two speeds above 0, the lower one first, but "{given}" was given.')
     return tuple(found) if whose is None else tuple(SpeedOf(end, whose) for end in found)
 
 

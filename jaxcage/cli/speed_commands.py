@@ -71,10 +71,10 @@ def simulate(
         k, hardness = float(model.wear.wear_coefficient), float(model.wear.hardness) / 1e9
         said = "wear is proportional to K, which is known to a decade or two at best"
         notes.append(f"Wear by Archard's law with K = {k:g} and a hardness of {hardness:g} GPa: {said}")
-    said = ", ".join(f"{n.replace('_', ' ')} {measures[n].value:.4g}" for n in TOLD if n in measures)
+    told = [jc.show.quantity_words(measures[name].quantity, measures.value(name)) for name in TOLD if name in measures]
     files = {"figure": jc.show.run_figure(model, found, rollers, title), "data": columns}
     tables = jc.show.run_tables(title, measures, rollers)
-    return Answer(f"At {where}: {said}.", tables, notes, document, files, part=f"_{speed:g}rpm")
+    return Answer(f"At {where}: {', '.join(told)}.", tables, notes, document, files, part=f"_{speed:g}rpm")
 
 
 def sweep(

@@ -173,7 +173,7 @@ class Subject:
         notes = {
             "Readings": [*filter(None, [jc.show.readings_words(self.model)])],
             "Lines still as `jaxcage init` wrote them (change or delete the comment of one that is yours)": left,
-            "Estimated from other dimensions, as no maker prints them": estimated,
+            "Estimated, as the file does not give them": jc.show.values_words(self.model, estimated),
             "Best guesses of values known within ranges only": guesses,
         }
         return document, [f"{what}: {', '.join(values)}" for what, values in notes.items() if values]
@@ -223,6 +223,8 @@ def read_case(given: str) -> Subject:
         name = "".join(c if c.isprintable() and c != "$" else "_" for c in name)
         found = Subject(name, file.model, None, file, given)
     if broken := jc.bearing.design_rule_violations(found.model.bearing, found.model.guidance_gap):
+        if found.file is not None and "bearing.pocket_clearance" in found.file.estimated:
+            broken.append("T is estimated: give pocket_clearance below [bearing] if you know it.")
         say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
     for doubt in found.model.lubricant.doubts():
         say(f"Warning: {doubt}")

@@ -93,6 +93,9 @@ def _run(call: functools.partial[Answer]) -> None:
     over = call.keywords.get("over")
     if over is not None and over != inspect.signature(call.func).parameters["over"].default:
         speeds |= {"first": over.first, "last": over.last}
+    operating = call.keywords.get("operating") or getattr(call.keywords.get("calm"), "operating", None)
+    if operating is not None:
+        speeds["operating"] = operating[1]
     check_case(call.keywords["subject"], speeds)
     if "other" in call.keywords:
         check_case(call.keywords["other"], {})
@@ -185,11 +188,12 @@ def _parse(arguments: list[str]) -> functools.partial[Answer] | None:
     except SystemExit as stop:
         if stop.code in (0, None):
             return None
-        raise InputError(_sentence(box.getvalue())) from stop
+        command = ["jaxcage", *(name for name in arguments[:1] if name in COMMANDS)]
+        raise InputError(_sentence(box.getvalue(), " ".join(command))) from stop
 
 
-def _sentence(box: str) -> str:
-    """Text of an error box of tyro as one sentence.
+def _sentence(box: str, command: str) -> str:
+    """Text of an error box of tyro as one sentence; it ends with the help of `command`.
 
     Parts are separated by rules; the title is in the upper border, or above a rule where there is no line drawing.
     """
@@ -201,4 +205,4 @@ def _sentence(box: str) -> str:
     if found and why.startswith("must "):
         return f"Option {ours} {why}"
     useful = [said, *(part for part in more[:1] if part.startswith("Available"))]
-    return "; ".join(part.rstrip(".") for part in useful) + " (see jaxcage --help)."
+    return "; ".join(part.rstrip(".") for part in useful) + f" (see {command} --help)."

@@ -97,8 +97,9 @@ class Design:
         rows = [f"Design: {self.verdict}, cost {self.cost_before:.4g} -> {self.cost:.4g}"]
         rows += [f"  {name} = {value:.6g}" for name, value in self.values.items()]
         for r in self.requirements:
+            unit = "" if r.unit == "1" else f" {r.unit}"
             was = f"{self.before[r.of].value:.4g}" if r.of in self.before else "unknown"
-            rows.append(f"  {r.name}: {was} -> {self.after[r.of].value:.4g} {r.unit} (limit {r.limit:.4g})")
+            rows.append(f"  {r.name}: {was} -> {self.after[r.of].value:.4g}{unit} (limit {r.limit:.4g})")
         return "\n".join(rows)
 
 
@@ -208,7 +209,7 @@ def design_for(
     check: int = 16,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Design:
-    """Find the cheapest design that is calm over an operating range, with margins, for every bearing within tolerances.
+    """Find the cheapest design that is stable over a range of speed, with margins, for all bearings within tolerances.
 
     **Arguments:**
 
@@ -227,7 +228,8 @@ def design_for(
 
     **Returns:** `Design`; if none is feasible, that with the least violation, and the requirements in conflict.
 
-    **Raises:** `ValueError` for a range without a stable orbit, or whose stable range does not end in bifurcations.
+    **Raises:** `ValueError` for a range without a stable orbit, or whose stable range does not end in bifurcations;
+    `RuntimeError` without double precision.
     """
     require_x64()
     require_at_least(1, searches=searches)

@@ -50,7 +50,8 @@ class Optimum:
     changed: bool
 
     def __str__(self) -> str:
-        rows = [f"Optimum after {len(self.history)} batches: {self.objective:.6g}"]
+        count = len(self.history)
+        rows = [f"Optimum after {count} batch{'es' * (count != 1)}: {self.objective:.6g}"]
         rows += [f"  {n:<24} {v:.6g}{' at bound' if n in self.at_bound else ''}" for n, v in self.values.items()]
         return "\n".join(rows)
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from .._allowed import ParameterInfo, allowed as must_be, must_be_given, within
-from .._catalogue import CageMaterial, cage_material, designated, estimated
+from .._bearing_data import CageMaterial, cage_material, designated, estimated
 from .._errors import ConfigError
 from .._kinematics import cage_speed_ratio
 from .disk import read_bytes
@@ -93,7 +93,7 @@ class Description:
     ranges: Ranges
     table: Mapping[str, Any]
     estimated: tuple[str, ...]
-    """Dotted names of values that no maker prints, estimated for the catalogue or from the material of the cage."""
+    """Dotted names of values that the file does not give, estimated for the catalogue or from the cage material."""
     material: CageMaterial | None = None
     """Material of the cage, if it is named."""
     left: tuple[str, ...] = ()

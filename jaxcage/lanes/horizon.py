@@ -117,6 +117,8 @@ def run_unsettled(run: Run, scale: Float[np.ndarray, "lanes dim"], onward: Onwar
     before tangent vectors are followed: their exponents are NaN."""
     lanes, seen, done = np.arange(len(scale)), None, 0
     for until in sorted({run.settled, run.discard}):
+        if not lanes.size:
+            break
         short = min(run.keep, until - done)
         look = dataclasses.replace(
             run, discard=until - done - short, revolutions=short, blocks=1, keep=short, exponents=0

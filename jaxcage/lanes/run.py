@@ -137,14 +137,17 @@ def sweep(
     - `settings`: fields of `jaxcage.lanes.Run`, such as `discard`, `revolutions`, `blocks`, `exponents`, `confirm`,
         `horizon` and `method`; or the `tolerance` of machine code, relative to state and scale.
 
-    **Returns:** a data set over `speed` and `initial_state` (and `design` for several designs), with the labels,
-    exponents and quantities of every lane. Lanes that fail are NaN with an outcome.
+    **Returns:** a data set over `speed` and `initial_state`, for several designs over `design` before these. Variables,
+    with further dimensions in brackets: `label`, `outcome`; `exponents`, `standard_error`, `doubt` (exponent);
+    `block_growth` (growth_block, exponent); `peak`, `error`, `steps`; `last`, `scale` (component); `strobe`
+    (revolution, component) except for a whole bearing; `escape` with a horizon; quantities of a whole bearing, and
+    `NAME_blocks` (block). `lanes.dataset` says what they are. Lanes that fail are NaN with an outcome.
 
     **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, and for impossible counts;
     `RuntimeError` without double precision.
     """
     require_x64()
-    require_known("sweep", INSTEAD, model, speeds)
+    require_known("sweep", INSTEAD, model=model, speeds=speeds)
     plan = Plan.over_speed(model, speeds, initial_states)
     run = Run.of(plan.model, **settings)
     if store is None:

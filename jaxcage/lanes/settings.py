@@ -30,7 +30,7 @@ class Run:
     """True to run lanes that are not periodic, their neighbours in speed and a tenth of the rest again with smaller
     steps."""
     horizon: int = 3000
-    """Revolutions of the whole run to which lanes that have not settled are followed; 0 for none."""
+    """Revolutions of the whole run, rounded up to blocks of 30, to which unsettled lanes are followed; 0 for none."""
     settled: int = 0
     """Revolutions after which a lane whose strobe states repeat is stopped as periodic; 0 runs all to the end."""
     method: AbstractMethod = dataclasses.field(default_factory=native)

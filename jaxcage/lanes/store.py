@@ -161,10 +161,11 @@ class Store:
 
 
 def open_study(path: str | Path) -> xr.Dataset:
-    """Open the results of a study so far, which are read from disk when they are used.
+    """Open the results so far of the study in the folder `path`.
 
-    Lanes that have not been run are NaN with the label and outcome `pending`. Reading a chunk that disagrees with its
-    checksum raises zarr's `ValueError`; running the study again computes it again.
+    **Returns:** a data set as of `study`, read from disk when it is used. Lanes that have not been run are NaN with the
+    label and outcome `pending`. Reading a chunk that disagrees with its checksum raises zarr's `ValueError`; running
+    the study again computes it again.
 
     **Raises:** `FileNotFoundError`; `ValueError` if it cannot be opened.
     """

@@ -75,7 +75,8 @@ def study(
 
     **Returns:** the store, opened by xarray: variables over the samples, the axes of the grid and `initial_state`.
 
-    **Raises:** `ValueError` for arguments that do not fit together, and for a store of another study.
+    **Raises:** `ValueError` for arguments that do not fit together, and for a store of another study; `RuntimeError`
+    without double precision.
     """
     require_x64()
     sampled: dict[str, Range] = {each: how for each, how in vary.items() if isinstance(how, Range)}
@@ -160,7 +161,7 @@ def label_map(
 
     **Returns:** a data set over x, y and `initial_state`, with the speed as a coordinate.
 
-    **Raises:** `ValueError` for arguments that do not fit together.
+    **Raises:** `ValueError` for arguments that do not fit together; `RuntimeError` without double precision.
     """
     require_x64()
     (x_name, x_value), (y_name, y_value) = (*x.items(), *y.items())

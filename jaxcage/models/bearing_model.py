@@ -423,9 +423,10 @@ WHOLE_BEARINGS: dict[str, Callable[[], BearingModel]] = {"nu2310": nu2310_bearin
 
 
 def whole_bearing(name: str) -> BearingModel:
-    """The whole bearing `name`: rollers, cage, land and inner ring, with the source of every number in its function.
+    """Build a whole bearing: rollers, cage, land and inner ring. `nu2310`, in any case, is the only name; its function
+    `nu2310_bearing` has the source of every number.
 
-    **Raises:** `ValueError` for an unknown name, `RuntimeError` without double precision.
+    **Returns:** `BearingModel`. **Raises:** `ValueError` for an unknown name, `RuntimeError` without double precision.
     """
     require_x64()
     if name.lower() not in WHOLE_BEARINGS:

@@ -123,9 +123,15 @@ QUANTITIES: tuple[Quantity, ...] = (
         "synchronous_force_x_N",
         "",
         "N",
-        "equivalent synchronous force: first harmonic of the pocket forces on the cage, horizontal amplitude",
+        "first harmonic of the pocket forces, horizontal amplitude",
         of=lambda a: _synchronous("x", a),
     ),
-    Quantity("synchronous_force_y_N", "", "N", "the same, vertical amplitude", of=lambda a: _synchronous("y", a)),
+    Quantity(
+        "synchronous_force_y_N",
+        "",
+        "N",
+        "first harmonic of the pocket forces, vertical amplitude",
+        of=lambda a: _synchronous("y", a),
+    ),
 )
 """Quantities of a whole bearing; their standard errors follow from the scatter of blocks of revolutions."""

@@ -83,9 +83,9 @@ LOSSES = {
     "raceway_damping": "damping of the raceway contacts",
     "pocket_friction": "friction in the pockets",
     "pocket_damping": "damping of the pocket contacts",
-    "film": "shearing and squeezing the film of the guiding land",
+    "film": "the film of the guiding land",
     "land_contact": "contact of cage and land",
-    "drag": "drag and churning of the rollers",
+    "drag": "drag, churning and rolling resistance",
     "mounting": "damping of the inner ring's mounting",
 }
 """Kinds of power that is lost, by the names of their integrals."""

@@ -140,7 +140,7 @@ CAGE_QUANTITIES = (
         "film_power",
         "",
         "W",
-        "power the film takes from the centre's motion, negative where it drives the whirl",
+        "power that the film takes from the centre's motion",
         of=lambda h: h.mean(-np.sum(h.forces["film"] * h.velocity, axis=1)),
     ),
 )

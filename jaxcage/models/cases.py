@@ -53,7 +53,7 @@ def case(name: str, constants: str = "identified") -> CageModel:
 
     **Arguments:** name; the set of constants that the paper does not print (`jaxcage.models.CONSTANTS`).
 
-    **Raises:** `ValueError` for an unknown name, `RuntimeError` without double precision.
+    **Returns:** `CageModel`. **Raises:** `ValueError` for an unknown name, `RuntimeError` without double precision.
     """
     require_x64()
     if constants not in CONSTANTS:

@@ -171,7 +171,10 @@ class _UsersSystem(AbstractForcedSystem):
 
 
 class ForcedSystem(_UsersSystem):
-    """A first-order system from a function `rates(tau, y, speed) -> dy/dt`, all tuples of scalars."""
+    """A first-order system from a function `rates(tau, y, speed) -> dy/dt`; y and dy/dt are tuples of scalars.
+
+    The phase tau [rad] grows with time at the `speed` [rad/s]; the units of y are the user's.
+    """
 
     rates: Callable[[Scalar, State, Scalar], State]
     _dimension: int = eqx.field(static=True)
@@ -207,7 +210,10 @@ class ForcedSystem(_UsersSystem):
 
 
 class ForcedOscillator(_UsersSystem):
-    """A second-order system from a function `acceleration(tau, q, v, speed) -> d2q/dt2`, all tuples of scalars.
+    """A second-order system from a function `acceleration(tau, q, v, speed) -> d2q/dt2`; q, v = dq/dt and d2q/dt2 are
+    tuples of scalars.
+
+    The phase tau [rad] grows with time at the `speed` [rad/s]; the units of q are the user's.
 
     !!! example
         def duffing(tau, q, v, speed):
@@ -231,10 +237,10 @@ class ForcedOscillator(_UsersSystem):
         angles: Sequence[int] = (),
     ):
         """**Arguments:** `acceleration(tau, q, v, speed)`, a function or a module (whose arrays are then differentiable
-        parameters), the same at tau and tau + 2 pi, with velocities v = dq/dt; number of coordinates; characteristic
-        magnitude of the state components (coordinates first); initial states (q, v) for sweeps; highest harmonic of
-        the revolution in the law; indices of the coordinates that are angles: periodic orbits may turn by whole
-        revolutions in them, and states that differ by these are the same.
+        parameters), the same at tau and tau + 2 pi; number of coordinates; characteristic magnitude of the state
+        components (coordinates first); initial states (q, v) for sweeps; highest harmonic of the revolution in the law;
+        indices of the coordinates that are angles: periodic orbits may turn by whole revolutions in them, and states
+        that differ by these are the same.
 
         **Raises:** `ValueError` for settings that do not fit, and for a law that does not repeat after one revolution.
         """

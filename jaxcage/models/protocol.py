@@ -196,14 +196,14 @@ def told(what: str) -> Iterator[None]:
         ) from error
 
 
-def require_known(function: str, instead: str, *arguments: object) -> None:
+def require_known(function: str, instead: str, **arguments: object) -> None:
     """Stop where `jax.vmap`, `jax.grad` or `jax.jit` traces a function whose control flow depends on its results.
 
     **Raises:** `ValueError` that names the function to call `instead`.
     """
     if not is_concrete(*jax.tree.leaves(arguments)):
         raise ArgumentError(
-            *("system", "speeds" if function == "sweep" else "speed"),
+            *arguments,
             said=(
                 f"of `{function}` must be known numbers, but are traced by `jax.vmap`, `jax.grad` or `jax.jit`, which "
                 f"cannot go over it: {instead}."

@@ -115,7 +115,8 @@ def bifurcation(
     **Returns:** `Point`; if none is found there is no exception (see `Point.status`). The function works under `jit`
     and `vmap`; value, speed and state have derivatives of every order with respect to `system` and `speed`.
 
-    **Raises:** `ValueError` for an unknown kind or parameter, or a guess without a speed.
+    **Raises:** `ValueError` for an unknown kind or parameter, or a guess without a speed; `RuntimeError` without double
+    precision.
     """
     require_x64()
     if periods is not None:

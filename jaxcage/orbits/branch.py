@@ -84,13 +84,16 @@ def branch(
 
     **Arguments:**
 
-    - `orbit`: an `Orbit`, a `Point`, or a pair (state, value of the parameter) near an orbit.
+    - `system`: any forced system.
+    - `orbit`: an `Orbit`, a `Point`, or a pair (state [SI], value of the parameter) near an orbit.
     - `parameter`: `"speed"`, the name of a parameter, or a function that picks it from the system.
     - `lower`, `upper`: range of the parameter [SI], in which `orbit` lies.
     - `speed`: speed [rad/s], if it is not the parameter and `orbit` does not contain it.
+    - `periods`: revolutions after which the orbit closes; those of `orbit`, if it is an `Orbit` or `Point`.
     - `steps`: step lengths; in units of 1/20 of the range for the parameter, and of the system's scale for the state.
 
-    **Raises:** `ValueError` if there is no orbit near `orbit`, or if the range is not finite.
+    **Returns:** `Branch`. **Raises:** `ValueError` if there is no orbit near `orbit`, or if the range is not finite;
+    `RuntimeError` without double precision.
     """
     require_x64()
     require_at_least(1, periods=periods)

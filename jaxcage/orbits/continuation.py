@@ -1,4 +1,5 @@
-"""Pseudo-arclength continuation of many curves of solutions at a time, as an iterator over (problem, points).
+"""Pseudo-arclength continuation of many curves of solutions at a time, as an iterator over (problem, points); the step
+control is in `arclength.py`.
 
 A curve R(u) = 0 with one more unknown than equations is followed through folds, whether stable or not: the step control
 predicts a point, the corrector finds the point of the curve on the plane through it, and events end the curve. Each of

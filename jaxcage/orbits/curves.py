@@ -92,7 +92,8 @@ def curve(
     - `x`, `y`: the two parameters, by name.
     - `lower`, `upper`, `x_lower`, `x_upper`: ranges of `y` and of `x` [SI]; the curve ends where it leaves them.
 
-    **Raises:** `ValueError` if Newton's method does not find the point again, or for a kind that cannot be followed.
+    **Returns:** `Curve`. **Raises:** `ValueError` if Newton's method does not find the point again, or for a kind that
+    cannot be followed; `RuntimeError` without double precision.
     """
     require_x64()
     if point.kind not in ("period-doubling", "Neimark-Sacker", "fold"):

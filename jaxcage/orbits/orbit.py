@@ -110,9 +110,9 @@ class Orbit(eqx.Module):
         if not bool(self.converged):
             return f"No orbit found (residual {float(self.residual):.1e})"
         what = "stable" if bool(self.stable) else "unstable"
-        mu = ", ".join(f"{complex(m):.4g}" for m in self.multipliers)
+        speed, mu = float(self.speed), ", ".join(f"{complex(m):.4g}" for m in self.multipliers)
         return (
-            f"Period-{int(self.periods)} orbit at {float(self.speed) * 30 / jnp.pi:.1f} rpm, {what}\n"
+            f"Period-{int(self.periods)} orbit at {speed:.6g} rad/s ({speed * 30 / jnp.pi:.1f} rpm), {what}\n"
             f"  state       {', '.join(f'{float(c):.6g}' for c in self.state)}\n"
             f"  multipliers {mu}\n"
             f"  residual {float(self.residual):.1e}, {int(self.steps)} steps per revolution, "
@@ -223,6 +223,8 @@ def periodic_orbit(
     **Returns:** `Orbit`, with the steps used and their error; if none is found there is no exception. The function
     works under `jit` and `vmap`. State and multipliers have derivatives of every order with respect to `system` and
     `speed`.
+
+    **Raises:** `ValueError` for an impossible speed, guess or count; `RuntimeError` without double precision.
     """
     require_x64()
     require_at_least(1, periods=periods)

@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 
 from .._arguments import require_at_least
+from .._errors import ArgumentError
 from ..lanes import states_at, sweep
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
@@ -195,13 +196,18 @@ def synchronous_orbits(
 ) -> SynchronousOrbits:
     """Find and follow the synchronous orbits between two speeds [rad/s].
 
-    **Arguments:** system and range; number of speeds simulated from each of the system's initial states; revolutions
-    discarded; an existing sweep to use instead of simulations. Simulations from the negatives of the initial states
-    only serve to find more orbits.
+    **Arguments:** system; lowest and highest speed [rad/s]; number of speeds simulated from each of the system's
+    initial states; revolutions discarded; an existing sweep to use instead of simulations; integration method; function
+    called with the stage and the numbers done and in all. Simulations from the negatives of the initial states only
+    serve to find more orbits.
 
     **Returns:** `SynchronousOrbits`. Simulations may miss stable orbits with a small basin of attraction.
+
+    **Raises:** `ValueError` for speeds that do not ascend; `RuntimeError` without double precision.
     """
     require_at_least(1, count=count)
+    if not lower < upper:
+        raise ArgumentError("lower", "upper", said=f"must ascend, but {lower:g} and {upper:g} rad/s were given.")
     say = progress or (lambda what, done, of: None)
     apart = _distance_in(system)
 

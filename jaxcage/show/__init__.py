@@ -78,11 +78,13 @@ from .parameter_tables import (
     differences_table as differences_table,
     readings_words as readings_words,
     sources_table as sources_table,
+    values_words as values_words,
 )
 from .quantity_tables import (
     displacements as displacements,
     mean_over_starts as mean_over_starts,
     quantities_table as quantities_table,
+    quantity_words as quantity_words,
     run_tables as run_tables,
     statics_table as statics_table,
 )

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .._allowed import SOURCES
-from .._catalogue import designated, estimated
+from .._bearing_data import designated, estimated
 from .._parameters import EXTRA, get, parameter_paths, readings_of, walk
 from ..files import BearingFile, configuration, is_range
 from ..models import AbstractForcedSystem
@@ -113,6 +113,17 @@ def _in_file(path: tuple[str, ...], table: Mapping[str, Any], given: Any) -> str
 def readings_words(model: Any) -> str:
     """Readings in one line: `radial clearance c = C_r/2 ("radial"), unbalance M e omega^2 ("physical")`."""
     return ", ".join(f'{READINGS[name]} {words} ("{chosen}")' for name, (chosen, words) in readings_of(model).items())
+
+
+def values_words(model: AbstractForcedSystem, names: Sequence[str]) -> list[str]:
+    """Parameters by dotted name, each with its value: `bearing.radial_clearance = 67.5 µm`."""
+    fields = {".".join(path): (get(model, path), field.metadata.get("parameter")) for path, field in walk(model)}
+    words = []
+    for name in names:
+        value, info = fields[name]
+        unit, number = ("", value) if info is None else shown(float(value), info.unit)
+        words.append(f"{name} = {number:.4g} {unit}".rstrip())
+    return words
 
 
 def differences(models: Sequence[Any]) -> list[dict[str, Any]]:

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from ..analysis import Measures, failed, named_lines, scatter
 from ..bearing import LoadDistribution, static_cage_displacements
+from ..quantities import Quantity
 from .run_figures import SPECTRA, Rollers
 from .tables import OWN, UNIT, Column, Table, table
 
@@ -42,6 +43,11 @@ def mean_over_starts(found: xr.Dataset, name: str) -> tuple[Float[np.ndarray, " 
 def head_of(name: str, unit: str) -> str:
     """Column header of a quantity: its name without its unit."""
     return name.removesuffix("_" + unit.replace(" ", "_").replace("^", "").replace("/", "_per_")).replace("_", " ")
+
+
+def quantity_words(quantity: Quantity, value: float) -> str:
+    """A quantity in a sentence, such as `friction power 1187 W`."""
+    return f"{head_of(quantity.name, quantity.unit)} {value:.4g} {quantity.unit}".removesuffix(" 1")
 
 
 def column_of(found: xr.Dataset, name: str) -> Column:
@@ -94,13 +100,13 @@ def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed:
     """Table of loads and displacements at rest, and the kinematics at a shaft speed [rad/s] if one is given."""
     bearing = model.bearing
     rows: list[tuple[str, Any, str]] = [
-        ("largest roller load", shared.max_load, "N"),
+        ("largest roller load on the inner raceway", shared.max_load, "N"),
         ("shift of the shaft", shared.shaft_shift, "m"),
         ("elastic approach", shared.elastic_approach, "m"),
         ("half angle of the loaded zone", shared.half_angle, "rad"),
     ]
-    for guidance, y in displacements(model, shared).items():
-        rows.append((f"cage displacement, {guidance.replace('_', ' ')} guidance", y, "m"))
+    at_rest = displacements(model, shared)[f"{getattr(model, 'guidance', 'outer')}_rib"]
+    rows.append(("displacement of the cage at rest", at_rest, "m"))
     celsius = float(model.lubricant.temperature) - 273.15
     viscosity = 1e6 * model.lubricant.kinematic_viscosity
     rows.append((f"kinematic viscosity of the oil at {celsius:g} °C", viscosity, "mm^2/s"))

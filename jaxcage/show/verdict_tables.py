@@ -202,7 +202,8 @@ def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float, slip: float 
     rules = [(words, value) for words, value in rules if math.isfinite(value)]
     below = [words for words, value in rules if load < value]
     said = "; ".join(f"{value / 1e3:.2g} kN ({words})" for words, value in rules)
-    verdict = f"the load of {load / 1e3:.3g} kN is {'below ' + ' and '.join(below) if below else 'above all of them'}"
+    side = "above all of them" if not below else "below all of them" if len(below) == len(rules) else ""
+    verdict = f"the load of {load / 1e3:.3g} kN is {side or 'below ' + ' and '.join(below)}"
     notes = [f"Minimum load against skidding at {shaft_rpm:.0f} rpm of the shaft: {said}; {verdict}"]
     if slip is None:
         return notes

@@ -230,7 +230,8 @@ def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: fl
     - `tolerance`: if given, steps are adaptive with this relative and absolute tolerance, the latter in units of the
         system's own scale.
 
-    **Raises:** `ValueError` for an unknown name, or both `steps` and `tolerance`.
+    **Returns:** the `method` argument of other functions. **Raises:** `ValueError` for an unknown name, or both `steps`
+    and `tolerance`.
     """
     if solver not in _SOLVERS:
         raise ArgumentError("solver", said=f"must be one of {', '.join(_SOLVERS)}, but '{solver}' was given.")
@@ -254,14 +255,15 @@ def _require_tolerance(tolerance: float) -> None:
 def native(
     tolerance: float = DEFAULT_TOLERANCE, error: float = DEFAULT_ERROR, pair: str = DEFAULT_PAIR
 ) -> AbstractMethod:
-    """Integration method in machine code, compiled from the traced law.
+    """Make an integration method in machine code, compiled from the traced law.
 
     **Arguments:** largest estimated error of a step, relative to the state and to the system's scale; largest measured
     error of a revolution in units of the scale, beyond which a lane is run again with smaller tolerances; embedded
     explicit pair (`tsit5`, `dopri5`, `bosh3`, `dopri8`), or the L-stable `rodas4`, to which lanes that need too many or
     too short explicit steps are switched automatically.
 
-    **Raises:** `ValueError` for numbers that are not positive, and an unknown pair.
+    **Returns:** the `method` argument of other functions. **Raises:** `ValueError` for a tolerance that is not between
+    0 and 1, an error that is not positive, and an unknown pair.
     """
     _require_tolerance(tolerance)
     if not error > 0:

@@ -40,8 +40,8 @@ Start = State | BearingState | Float[Array, " dim"] | Float[np.ndarray, " dim"]
 
 @dataclasses.dataclass(frozen=True)
 class Trajectory:
-    """Time history: states at equally spaced phases, or at given times; with additional integrands also at the end of
-    the last revolution."""
+    """Time history that `simulate` and `ramp` return: states in SI units at equally spaced phases, speeds in rad/s;
+    with additional integrands also at the end of the last revolution."""
 
     time: Float[np.ndarray, " n"]
     """Time from the first sample, for a whole bearing from the beginning of the run [s]."""
@@ -190,18 +190,19 @@ def simulate(
 ) -> Trajectory:
     """Simulate a time history at one speed.
 
-    **Arguments:** model; speed [rad/s] (of the shaft for a whole bearing); revolutions recorded, and discarded before
-    (of the cage for a whole bearing); samples per revolution, which must divide the steps per revolution of a method
-    with fixed steps; initial state, by default the model's first one; integration method, by default
-    `jaxcage.native(1e-8)`, for a whole bearing `jaxcage.native(1e-5, 1e-2)`.
+    **Arguments:** system, such as a model; speed [rad/s] (of the shaft for a whole bearing); revolutions recorded, and
+    discarded before (of the cage for a whole bearing); samples per revolution, which must divide the steps per
+    revolution of a method with fixed steps; initial state, by default the model's first one; integration method, by
+    default `jaxcage.native(1e-8)`, for a whole bearing `jaxcage.native(1e-5, 1e-2)`.
 
     **Returns:** `Trajectory`; a run that fails, or is `inaccurate`, is NaN from there on, with the reason in `outcome`.
     If the cage of a whole bearing comes to rest, or leaves its land, the outcome is `outside`.
 
-    **Raises:** `ValueError` for a speed that is not positive, or impossible counts.
+    **Raises:** `ValueError` for a speed that is not positive, or impossible counts; `RuntimeError` without double
+    precision.
     """
     require_x64()
-    require_known("simulate", INSTEAD, system, speed, start)
+    require_known("simulate", INSTEAD, system=system, speed=speed, start=start)
     options: dict[str, Any] = dict(revolutions=revolutions, samples=samples, discard=discard)
     return ramp(system, speed, speed, **options, start=start, method=method)  # a ramp with equal ends
 
@@ -222,13 +223,13 @@ def ramp(
     Within a revolution the speed changes in `samples` steps or more. The tangential force M e dw/dt of the unbalance is
     neglected: its ratio to M e w^2 is the relative change of speed per radian.
 
-    **Arguments:** model; first and last speed [rad/s]; revolutions of the whole ramp; `discard`, revolutions at the
+    **Arguments:** system; first and last speed [rad/s]; revolutions of the whole ramp; `discard`, revolutions at the
     first speed before it, which are left out; the rest as in `simulate`.
 
-    **Returns:** `Trajectory` with the speed of each sample.
+    **Returns:** `Trajectory` with the speed of each sample. **Raises:** as `simulate`.
     """
     require_x64()
-    require_known("ramp", INSTEAD, system, first, last, start)
+    require_known("ramp", INSTEAD, system=system, first=first, last=last, start=start)
     low, high = float(first), float(last)
     require_speeds(system, (low, high))
     require_at_least(1, revolutions=revolutions, samples=samples)

@@ -29,7 +29,9 @@ def designated(given: str) -> str:
         name = name.rstrip("ABCDEFGHIJKLMNOPQRSTVWXYZ")
     if name not in rows():
         raise ArgumentError(
-            "designation", said=f"must be one of {', '.join(rows())}, but {given!r} was given: give dimensions."
+            "designation",
+            said=f"must be one of {', '.join(rows())}, but {given!r} was given: leave out a suffix such as C3, or give "
+            "dimensions.",
         )
     return name
 
