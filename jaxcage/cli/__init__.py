@@ -11,7 +11,7 @@
 | `speed_commands`   | commands that run the model: at one speed, over speed, over anything        |
 | `orbit_commands`   | commands about periodic orbits: edges, gradients, maps                      |
 | `design_commands`  | commands about designs: better ones, tolerances, unknown values             |
-| `case_commands`    | commands about the case itself: file, statics, report                       |
+| `case_commands`    | commands about the case itself: file, verdict, statics, report              |
 
 Modules of commands use the library within the functions, so that help and errors of typing answer at once.
 """

@@ -1,4 +1,4 @@
-"""Commands about the case itself: its file, its statics, a report."""
+"""Commands about the case itself: its file, the verdict for an operating range, its statics, a report."""
 
 import dataclasses
 import shlex
@@ -15,13 +15,15 @@ import jaxcage as jc
 from .._errors import InputError
 from . import options as o
 from .answer import Answer
-from .check_command import at_best_guess, chances, check
 from .orbit_commands import bars, explained, gradient, mapped, of_orbits
-from .progress import interrupted, report as tell, visible
-from .speed_commands import simulate, swept
+from .progress import interrupted, report as tell, report_lanes, say, visible
+from .speed_commands import chances, simulate, swept
 from .subject import RPM, Subject
 
 
+SPEEDS = 9
+"""Speeds at which a bearing with its rollers is simulated."""
+LENGTH: dict[str, Any] = {"initial_states": 2, "discard": 30, "revolutions": 20, "blocks": 4, "exponents": 0}
 FOLLOWED = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
 """Edges that are followed across the map, which takes about a minute each."""
 
@@ -50,6 +52,70 @@ def init(
     options = {"check": operating, "statics": "--speed 14000", "sweep": over, "zones": over, "report": operating}
     commands = [f"  jaxcage {command} {path} {given}" for command, given in options.items()]
     return Answer(said, notes=commands, document={"file": str(written)})
+
+
+def check(
+    subject: o.Case,
+    *,
+    operating: o.Operating,
+    draws: o.Draws = 64,
+    show: o.ShowOptions = o.ShowOptions(),
+) -> Answer:
+    """The verdict for an operating range: calm or not, with its probability and margin, and what to change first."""
+    subject, ends = subject.operating(operating)
+    if subject.with_rollers:
+        return _with_rollers(subject, ends)
+    d = jc.design
+    margins = d.margins(subject.model, ends)
+    margin = jc.show.margin_sentence(margins, *(subject.beside or (subject.own, 1.0)))
+    if subject.unknowns and not isinstance(margins, str):
+        margin = at_best_guess(margin)
+    say(f"Preliminary: {margin}")
+    tables = [] if isinstance(margins, str) else [jc.show.margins_table(margins, subject.beside)]
+    if not isinstance(margins, str) and margins.changes:
+        tables.append(jc.show.changes_table(subject.model, margins))
+    if subject.unknowns and draws:
+        found = chances(subject, np.linspace(*ends, d.RANGE_SPEEDS), draws)
+        by_speed, *decide = found.tables
+        tables += [*decide, dataclasses.replace(by_speed, detail=True)]
+    else:
+        checked = d.check_design(subject.model, ends, progress=report_lanes)
+        over = subject.over(*checked.speeds_rpm[[0, -1]] / RPM)
+        document = {"verdict": checked.state, "checked": checked}
+        found = Answer(jc.show.range_sentence(over, checked), notes=[f"Checked: {checked}"], document=document)
+    model = 'The cage model prescribes the impacts of the rollers; slip and forces: a file with model = "bearing"'
+    document = {"operating_rpm": [end * RPM for end in ends], **found.document}
+    table, largest = _forces(subject, ends)
+    said, notes = f"{found.sentence} {margin}", [largest, *found.notes, model]
+    return dataclasses.replace(found, sentence=said, tables=[*tables, table], notes=notes, document=document)
+
+
+def _forces(subject: Subject, ends: tuple[float, float]) -> tuple[Any, str]:
+    """Table of the forces on the cage at both ends of a range of its speed [rad/s], and a note on the largest."""
+    whose, ratio = subject.beside or (subject.own, 1.0)
+    found = {f"{ratio * end * RPM:.0f} rpm {whose}": jc.analysis.largest_forces(subject.model, end) for end in ends}
+    return jc.show.forces_table(found), jc.show.forces_note(found, [u.label for u in subject.unknowns])
+
+
+def at_best_guess(said: str) -> str:
+    """Sentence about the best guess of values that are known within ranges only."""
+    return f"At the best guess {said[:1].lower()}{said[1:]}"
+
+
+def _with_rollers(subject: Subject, ends: tuple[float, float]) -> Answer:
+    """The verdict for a bearing with its rollers: the motion of its cage, its slip, and the makers' minimum load."""
+    found = jc.sweep(subject.model, np.linspace(*ends, SPEEDS), **LENGTH, progress=partial(report_lanes, "simulations"))
+    jc.show.require_some(found)
+    notes = jc.show.minimum_load_notes(subject.model.bearing, float(subject.model.load), ends[1] * RPM)
+    notes += [f"{jc.show.MOTIONS[name]}: {words}" for name, words in jc.show.MOTION_WORDS.items()]
+    notes.append("The motion is that of the cage: rollers that rattle in their pockets do not count")
+    notes.append(
+        f"{found.sizes['speed']} speeds, {found.sizes['initial_state']} initial states, {jc.analysis.length(found)}"
+    )
+    document = {"operating_rpm": [end * RPM for end in ends], "verdict": jc.show.cage_verdict(found)}
+    over = subject.over(*found["speed"].values[[0, -1]])
+    table = jc.show.motion_table(f"Motion of the cage of {subject.name}", found)
+    return Answer(jc.show.motion_sentence(over, found), [table], notes, document)
 
 
 def statics(
@@ -93,7 +159,6 @@ def report(
     over: o.Range = o.Range(),
     operating: o.Operating = None,
     draws: o.Draws = 64,
-    seed: o.Seed = 0,
     quick: o.Quick = False,
     run: o.RunOptions = o.RunOptions(),
     show: o.ShowOptions = o.ShowOptions(),
@@ -102,12 +167,12 @@ def report(
     began, (low, high), name = time.perf_counter(), subject.ends(over), subject.name
     parts, words, at = [], ["jaxcage", "report", Path(subject.path).name or name], None
     if operating is not None:
-        parts.append(("Verdict", check(subject, operating=operating, draws=draws, seed=seed)))
+        parts.append(("Verdict", check(subject, operating=operating, draws=draws)))
         subject, at = subject.operating(operating)
         low, high = min(low, at[0]), max(high, at[1])
         words += ["--operating", f"{operating[0]:g}-{operating[1]:g} rpm {subject.speeds}"]
     elif subject.unknowns and draws:
-        parts.append(("Chances", chances(subject, subject.range(over, 40), draws, seed, run)))
+        parts.append(("Chances", chances(subject, subject.range(over, 40), draws, run)))
     if interrupted():
         return parts[0][1]
     count = over.count or subject.usual(126 if quick else 251, 5 if quick else 13)

@@ -5,7 +5,7 @@ import dataclasses
 import math
 import re
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 from tyro.conf import arg
@@ -120,8 +120,7 @@ def pair(sign: str, must: str, holds: Callable[[int, int], bool]) -> Any:
 
 _SPEED = number("be a speed above 0 rpm", lambda x: x > 0, "rpm")
 _LOAD = number("be above 0 N", lambda x: x > 0, "N")
-_NOT_NEGATIVE = number("be at least 0", lambda x: x >= 0)
-_ABOVE = number("be above 0", lambda x: x > 0)
+_NUMBER = number()
 _OWN = "Bare numbers are the cage's [rpm], of a bearing with its rollers, or where a file says so, the shaft's"
 _SIDES = f"be ACROSSxUPWARDS, each from {SIDE[0]} to {SIDE[-1]}, e.g. 300x300"
 _CASE = "A published case (1a, 1b, 2a, 2b, 3a, 3b), a bearing with its rollers (nu2310), or a TOML file."
@@ -175,7 +174,7 @@ class StepOptions:
     """Integration method: rk4, rodas4, tsit5."""
     steps: OptionalCount = None
     """Number of equal steps per revolution."""
-    tolerance: Annotated[float | None, number()] = None
+    tolerance: Annotated[float | None, _NUMBER] = None
     """Tolerance of adaptive steps."""
 
     @property
@@ -246,19 +245,19 @@ class CalmOptions:
     """Requirements on the design of a cage over an operating range."""
 
     operating: Operating = None
-    objective: Annotated[str, text("be cost or width", lambda x: x in ("cost", "width"))] = "cost"
+    objective: Literal["cost", "width"] = "cost"
     """The quantity to minimise: cost, or the exact width of the unstable ranges within --operating."""
-    margin: Annotated[float, number("be at least 0 and below 50", lambda x: 0 <= x < 50)] = 10.0
+    margin: Annotated[float, _NUMBER] = 10.0
     """Least distance of both ends of the range from the edges of the stable range, per cent of speed."""
-    decay: Annotated[float | None, _ABOVE] = None
+    decay: Annotated[float | None, _NUMBER] = None
     """Largest number of revolutions in which a small disturbance falls to 1/e."""
     least_film: OptionalText = None
     """Least distance of cage and land, e.g. "20 um"."""
-    land_force: Annotated[float | None, _NOT_NEGATIVE] = None
+    land_force: Annotated[float | None, _NUMBER] = None
     """Largest force of the land on the cage in calm motion [N]; 0 forbids contact."""
-    grade: Annotated[float | None, _ABOVE] = None
+    grade: Annotated[float | None, _NUMBER] = None
     """Largest balance grade G [mm/s]."""
-    drag: Annotated[float | None, _ABOVE] = None
+    drag: Annotated[float | None, _NUMBER] = None
     """Largest power lost by shear of the film [W]."""
     tolerance: OptionalText = None
     """Tolerances within which all of this must hold, e.g. "guidance_gap=+-0.05 mm, eccentricity=G6.3"."""

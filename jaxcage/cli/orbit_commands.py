@@ -11,9 +11,8 @@ import jaxcage as jc
 from .._errors import ArgumentError, InputError, NoResult
 from . import options as o
 from .answer import Answer
-from .check_command import chances
 from .progress import report
-from .speed_commands import counted, said_of, swept, zone_notes
+from .speed_commands import chances, counted, said_of, swept, zone_notes
 from .subject import RPM, Subject
 
 
@@ -23,7 +22,6 @@ def zones(
     over: o.Range = o.Range(),
     load: o.Load = None,
     draws: o.Draws = 64,
-    seed: o.Seed = 0,
     quick: o.Quick = False,
     run: o.SweepOptions = o.SweepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
@@ -33,7 +31,7 @@ def zones(
     For a bearing with its rollers: ranges of speed with the same motion. For a file with ranges: chances of chaos.
     """
     if subject.unknowns and draws:
-        return chances(subject, subject.range(over, 40), draws, seed, run)
+        return chances(subject, subject.range(over, 40), draws, run)
     found, answer = swept(subject, subject.range(over, subject.usual(251, 13)), run)
     if subject.with_rollers:
         return answer
@@ -132,8 +130,6 @@ def gradient(
     zone: o.FromZero = 0,
     by: tuple[str, ...] = (),
     designs: o.FromTwo = 64,
-    chaos: bool = False,
-    seed: o.Seed = 0,
     means: o.MeanOptions = o.MeanOptions(),
     steps: o.StepOptions = o.StepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
@@ -148,12 +144,11 @@ def gradient(
         zone: With --lasting: number of the zone, as `jaxcage sweep` counts them; 0 takes all.
         by: With --lasting or --speed: parameters; those joined by + change together.
         designs: With --lasting or --speed: number of designs around this one from which slopes are estimated.
-        chaos: With --speed: the mean slope of the largest Lyapunov exponent as well.
     """
     model, method, name = subject.model, steps.method, subject.name
-    given: dict[str, Any] = {"designs": designs, "seed": seed}
+    given: dict[str, Any] = {"designs": designs}
     if subject.with_rollers:
-        return _of_means(subject, means, steps.tolerance or 1e-4, chaos, by or jc.design.DIRECTIONS, given)
+        return _of_means(subject, means, steps.tolerance or 1e-4, by or jc.design.DIRECTIONS, given)
     if means.speed is not None:
         raise InputError(f"Option --speed goes with a bearing with its rollers, but {name} is a cage.")
     if lasting:
@@ -218,19 +213,13 @@ def _of_lasting(subject: Subject, over: o.Range, zone: int, names: tuple[str, ..
 
 
 def _of_means(
-    subject: Subject,
-    means: o.MeanOptions,
-    tolerance: float,
-    chaos: bool,
-    directions: tuple[str, ...],
-    given: dict[str, Any],
+    subject: Subject, means: o.MeanOptions, tolerance: float, directions: tuple[str, ...], given: dict[str, Any]
 ) -> Answer:
     """Derivatives of the means of runs at one speed, from pairs of designs around the given one."""
     at, length = subject.speed(means.speed), means.length(initial_states=2, discard=20, revolutions=40)
     told = {"tolerance": tolerance, "progress": partial(report, "designs")}
-    runs = jc.design.Runs(at, **length, blocks=2, exponents=int(chaos), **told)
-    statistics = (*jc.design.STATISTICS, *(["exponent"] if chaos else []))
-    found = jc.design.mean_gradient(subject.model, runs, statistics, directions=directions, **given)
+    runs = jc.design.Runs(at, **length, blocks=2, exponents=0, **told)
+    found = jc.design.mean_gradient(subject.model, runs, directions=directions, **given)
     title, each = f"{subject.name}, {subject.at(at)}", found.statistics.items()
     by = [(abs(x), n, d, x) for n, g in each for d, x in zip(g.directions, g.elasticity) if np.isfinite(x)]
     _, name, direction, most = max(by, default=(0.0, "nothing", "any parameter", 0.0))

@@ -14,9 +14,7 @@ from typing import Any, TypeAlias
 from .._errors import Stop
 
 
-FILES_ARE_WHOLE = "files of earlier runs are as they were, and the same command starts over"
 SECONDS_BETWEEN_LINES = 10.0
-SECONDS_TO_ESTIMATE = 3.0
 ENDS = (signal.SIGINT, signal.SIGTERM)
 """Signals by which a command is told to end."""
 LISTENS = 5.0
@@ -26,8 +24,6 @@ _SHOW_CURSOR_AND_CLEAR_LINE = "\x1b[?25h\r\x1b[2K"
 Report: TypeAlias = Callable[[str, int, int], None]
 """Takes what is being done, how much of it is done, and of how much."""
 _number: int = signal.SIGINT
-_advice = FILES_ARE_WHOLE
-"""Words for a user who interrupts."""
 _computes = _stops = _stopped = _ends = False
 """True during a computation, after it was asked to stop, after its lanes were stopped, and once the process ends."""
 _heard = -math.inf
@@ -58,12 +54,6 @@ def interrupted() -> bool:
 def ends() -> bool:
     """True once an interruption has been raised, which a library may turn into another exception."""
     return _ends
-
-
-def advise(text: str) -> None:
-    """Say something else than `FILES_ARE_WHOLE` to a user who interrupts this computation."""
-    global _advice
-    _advice = text
 
 
 def say(text: str) -> None:
@@ -109,7 +99,7 @@ def end_interrupted() -> int:
     for each in ENDS:
         if signal.getsignal(each) is _on_interruption:  # which Python would reset to the default while it ends
             signal.signal(each, signal.SIG_IGN)
-    say(f"Interrupted: {_advice}.")
+    say("Interrupted: files are whole, and the same command starts over or goes on from what is stored.")
     return 128 + _number
 
 
@@ -134,9 +124,8 @@ def _on_interruption(number: int, frame: FrameType | None) -> None:
 
 @contextlib.contextmanager
 def progress(text: str) -> Iterator[None]:
-    """Around a computation: a bar in a terminal, a line every ten seconds elsewhere, and how long a stage takes."""
+    """Around a computation: a bar in a terminal, elsewhere a line every ten seconds."""
     global _computes, _stops, _stopped, _report
-    advise(FILES_ARE_WHOLE)
     _computes, _stops, _stopped = True, False, False
     try:
         with _bar(text) if sys.stderr.isatty() else contextlib.nullcontext(None) as bar:
@@ -147,29 +136,21 @@ def progress(text: str) -> Iterator[None]:
 
 
 def _timed(text: str, bar: Report | None) -> Report:
-    """Report that says once for each stage of more than a minute how long it takes, from its rate since the first
-    change of what is done; without a bar, also lines with what is done."""
-    stage, last, first, began, told, said = "", 0, 0, math.nan, False, time.monotonic()
+    """Report that moves the bar or, without one, prints lines with what is done and the time that the rest takes, from
+    the rate since the stage began."""
+    stage, first, began, said = "", 0, math.nan, time.monotonic()
 
     def report(what: str, done: int, total: int) -> None:
-        nonlocal stage, last, first, began, told, said
+        nonlocal stage, first, began, said
         now = time.monotonic()
-        if what != stage or done < last:
-            stage, began, told = what, math.nan, False
-        elif math.isnan(began) and done > last:
-            first, began = done, now
-        last = done
-        left = (total - done) * (now - began) / (done - first) / 60 if done > max(first, 0) else math.nan
-        if not told and now - began > SECONDS_TO_ESTIMATE and not math.isnan(left):
-            told = True
-            if left > 1:
-                said = now
-                say(f"{text}, {what}: about {left:.0f} min for all {total}")
+        if what != stage:
+            stage, first, began = what, done, now
         if bar is not None:
             bar(what, done, total)
         elif now - said >= SECONDS_BETWEEN_LINES:
             said = now
-            say(f"{text}, {what}: {done} of {total}{'' if math.isnan(left) else f', {left:.1f} min left'}")
+            left = f", {(total - done) * (now - began) / (done - first) / 60:.1f} min left" if done > first else ""
+            say(f"{text}, {what}: {done} of {total}{left}")
 
     return report
 

@@ -16,8 +16,7 @@ import jaxcage as jc
 from .._errors import InputError, NoResult
 from . import options as o
 from .answer import Answer
-from .check_command import chances
-from .progress import advise, interrupted, report, report_lanes, say
+from .progress import interrupted, report, report_lanes, say
 from .subject import RPM, Subject
 from .values import read_vary
 
@@ -84,7 +83,6 @@ def sweep(
     over: o.Range = o.Range(),
     load: o.Load = None,
     draws: o.Draws = 64,
-    seed: o.Seed = 0,
     run: o.SweepOptions = o.SweepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
@@ -94,8 +92,37 @@ def sweep(
     its rollers keeps them in --out, and the same command goes on from there.
     """
     if subject.unknowns and draws:
-        return chances(subject, subject.range(over, 40), draws, seed, run)
+        return chances(subject, subject.range(over, 40), draws, run)
     return swept(subject, subject.range(over, subject.usual(251, 13)), run, show.out)[1]
+
+
+def chances(subject: Subject, speeds: Any, draws: int, run: o.RunOptions = o.RunOptions()) -> Answer:
+    """Answer on the probability that a cage with unknown values is calm at all speeds [rad/s], and on what would decide
+    it; the first of its tables is the one by speed."""
+    d, told = jc.design, {"draws": draws, "progress": partial(report_lanes, "draws")}
+    found = d.ensemble(subject.model, subject.unknowns, speeds, **told, **run.settings)
+    if found.failed.all():
+        raise NoResult(f"All {found.failed.size} simulations failed: try more steps (--steps), or narrower ranges.")
+    chance, *outcomes = d.range_chance(found, found.rpm[0], found.rpm[-1])
+    draws = len(found.place)
+    rows, over = d.indices(found, *outcomes), subject.over(*found.speed[[0, -1]])
+    columns = subject.speed_columns(found.speed)
+    columns |= dict(zip(("chance of chaos", "lower", "upper"), found.chance_of_chaos.T, strict=True))
+    title = f"{subject.name}: chaotic share of {draws} draws, at each speed alone"
+    figure = jc.show.drawn(partial(jc.show.chance_of_chaos, found), title=title)
+    tables = [jc.show.chances_table(subject.name, found, subject.beside)]
+    tables += [jc.show.indices_table(rows)] if rows and rows[0].telling else []
+    by_speed = [{"rpm": rpm, **_record(each)} for rpm, each in zip(found.rpm, found.chances, strict=True)]
+    document = _record(chance) | {"by_speed": by_speed}
+    notes, files = [jc.show.indices_note(rows), *jc.show.chances_notes(found)], {"figure": figure, "data": columns}
+    said, details = jc.show.range_sentence(over, chance), jc.show.unknowns_notes(found)
+    return Answer(said, tables, notes, document, files, details, by_ranges=True)
+
+
+def _record(chance: Any) -> dict[str, Any]:
+    """A chance for a document."""
+    numbers = {"calm_share": chance.share, "calm_interval": chance.interval}
+    return {"verdict": chance.state, **numbers, "chaotic_draws": chance.chaotic, "known_draws": chance.known}
 
 
 def swept(subject: Subject, speeds: Any, run: o.RunOptions, out: str | None = None) -> tuple[Any, Answer]:
@@ -105,7 +132,6 @@ def swept(subject: Subject, speeds: Any, run: o.RunOptions, out: str | None = No
     if subject.with_rollers and out is not None:
         given = jc.files.configuration(subject.model), speeds.tolist(), run.settings, jc.solve.cores(), jc.__version__
         kept = Path(out) / f"sweep_{subject.name}_unfinished_{zlib.crc32(repr(given).encode()):08x}.zarr"
-        advise("finished speeds are kept, and the same command goes on from there")
     stage = f"lanes of {settings.discard + settings.revolutions} revolutions"
     told = partial(report if out is None else report_lanes, stage)
     found = jc.sweep(subject.model, speeds, **run.settings, progress=told, store=kept)
@@ -303,7 +329,6 @@ def study(
     given, done = read_vary(vary, subject), []
     settings: dict[str, Any] = {"samples": sample, "seed": seed, "initial_states": initial_states}
     settings |= {"shard": shard or (1, 1)} | run.settings
-    advise("what is stored stays, and the same command goes on from there")
 
     def stored_so_far(lanes: int, total: int) -> None:
         done.append(lanes)

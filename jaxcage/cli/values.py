@@ -82,31 +82,22 @@ def read_prices(given: Sequence[str], usual: dict[str, float]) -> dict[str, floa
             raise ValueError(f"must be at least 0, but {value:g} was given.")
         return value
 
-    found = usual | _read_each("--price", given, "NAME=NUMBER", read)
-    if len(found) > 1 and not sum(found.values()):
-        raise InputError("Option --price must not make all weights 0.")
-    return found
+    return usual | _read_each("--price", given, "NAME=NUMBER", read)
 
 
 def read_tolerances(text: str, subject: Subject, fastest: float) -> dict[str, Any]:
     """Read `NAME=±X, NAME=G6.3, ...` in SI units; a grade refers to the `fastest` cage speed [rad/s]. **Raises:**
     `InputError`."""
-    info, now = jc.parameter_info(subject.model), jc.parameters(subject.model)
+    info = jc.parameter_info(subject.model)
 
     def read(name: str, words: str) -> Any:
         if name not in info:
             raise InputError(f"Option --tolerance must name a parameter of the cage, but names '{name}'.")
-        if (grade := GRADE.fullmatch(words)) is not None:
-            if name != "eccentricity":
-                raise ValueError("cannot have a balance grade, which is one of the eccentricity.")
+        if name == "eccentricity" and (grade := GRADE.fullmatch(words)) is not None:
             return jc.Tolerance.balanced(float(grade[1]), fastest)
-        sign, width = words[:1], words[1:].strip()
-        if sign != "±":
-            raise ValueError(f"must be ±X with a unit, ±X % or a grade such as G6.3, but is {words}.")
-        if width.endswith("%"):
-            half = abs(float(now[name])) * float(width[:-1]) / 100
-        else:
-            half = jc.files.to_si(width, info[name].unit)
+        if not words.startswith("±"):
+            raise ValueError(f"must be ±X with a unit or, for the eccentricity, a grade such as G6.3, but is {words}.")
+        half = jc.files.to_si(words[1:].strip(), info[name].unit)
         return jc.Tolerance(-half, half)
 
     parts = [part.strip() for part in text.split(",") if part.strip()]

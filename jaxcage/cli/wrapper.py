@@ -20,7 +20,6 @@ from .._cache import keep_compiled_programs
 from .._errors import ArgumentError, InputError, NoResult
 from . import (
     case_commands as case,
-    check_command as checking,
     design_commands as design,
     orbit_commands as orbit,
     speed_commands as speed,
@@ -42,14 +41,14 @@ from .subject import check_case, read_case
 OK, FAILED, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
 FUNCTIONS: tuple[Callable[..., Answer], ...] = (
-    *(case.init, checking.check, speed.simulate, speed.sweep, orbit.zones, orbit.bifurcations, orbit.gradient),
+    *(case.init, case.check, speed.simulate, speed.sweep, orbit.zones, orbit.bifurcations, orbit.gradient),
     *(speed.compare, speed.runup, orbit.map_, speed.study, design.design, design.sensitivity, design.identify),
     *(speed.poincare, case.statics, case.report),
 )
 COMMANDS = {function.__name__.rstrip("_"): function for function in FUNCTIONS}
 CALLED = {"directions": "by", "samples": "sample", "settle": "discard", "confirm": "no_confirm"}
 CALLED |= {"method": "solver", "centrifugal_force": "speed", "blocks": "revolutions", "store": "out"}
-CALLED |= {"x": "points", "y": "points"}
+CALLED |= {"x": "points", "y": "points", "film": "least_film", "balance": "grade", "prices": "price"}
 """Option that sets an argument of the library, where it has another name."""
 
 
@@ -100,7 +99,6 @@ def _run(call: functools.partial[Answer]) -> None:
     check_case(call.keywords["subject"], speeds)
     if "other" in call.keywords:
         check_case(call.keywords["other"], {})
-    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA writes pages about each program that it finds compiled
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells where it stores fonts if there is no home folder
     import jax
 

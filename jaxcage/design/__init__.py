@@ -6,23 +6,20 @@
 | `requirements`  | limits that a design must keep, what it costs, tolerances of manufacture           |
 | `operating`     | edges and orbits of an operating range, with exact derivatives by the design       |
 | `optimiser`     | the cheapest design that keeps its requirements over an operating range            |
-| `check`         | simulations of a design from many initial states                                   |
 | `statistics`    | chaotic speeds, quantities and loads of designs from one sweep; comparisons        |
 | `slopes`        | derivatives of statistics by paired designs; tolerance budgets                     |
 | `survival_edges`| edges of lasting chaos with slopes by survival regression; widths of zones         |
 | `variance`      | Sobol indices                                                                      |
 | `surrogate`     | search for a better design by a Gaussian process                                   |
 | `unknowns`      | chances of chaos with unknown parameters; ranges narrowed by measurements          |
-| `verdict`       | whether a cage is calm over an operating range, its margins, what to change first  |
+| `verdict`       | margins of a design, what to change first, simulations from many initial states    |
 """
 
 from .._arguments import check_layer
-from .check import Checked as Checked, check_design as check_design
 from .design_space import DesignSpace as DesignSpace, Value as Value
 from .operating import OperatingRange as OperatingRange
 from .optimiser import SEARCHES as SEARCHES, Design as Design, design_for as design_for
 from .requirements import (
-    COSTS as COSTS,
     Price as Price,
     Requirement as Requirement,
     Requirements as Requirements,
@@ -44,7 +41,7 @@ from .statistics import (
     CAGE_PARAMETERS as CAGE_PARAMETERS,
     COMPARED as COMPARED,
     OBJECTIVE as OBJECTIVE,
-    STATISTICS as STATISTICS,
+    TERMS as TERMS,
     BeforeAfter as BeforeAfter,
     Runs as Runs,
     bearing_objective as bearing_objective,
@@ -63,25 +60,19 @@ from .survival_edges import (
     zone_width as zone_width,
 )
 from .unknowns import (
-    REVOLUTIONS as REVOLUTIONS,
+    RANGE_SPEEDS as RANGE_SPEEDS,
+    Chance as Chance,
     Ensemble as Ensemble,
     Index as Index,
     Narrowed as Narrowed,
-    binomial_interval as binomial_interval,
     ensemble as ensemble,
     indices as indices,
     misses as misses,
     narrow as narrow,
-    verdict_of as verdict_of,
-)
-from .variance import SobolIndices as SobolIndices, global_sensitivity as global_sensitivity
-from .verdict import (
-    RANGE_SPEEDS as RANGE_SPEEDS,
-    Margins as Margins,
-    RangeChance as RangeChance,
-    margins as margins,
     range_chance as range_chance,
 )
+from .variance import SobolIndices as SobolIndices, global_sensitivity as global_sensitivity
+from .verdict import Checked as Checked, Margins as Margins, check_design as check_design, margins as margins
 
 
 check_layer(globals(), "design_for global_sensitivity mean_gradient surrogate_search tolerance_budget")

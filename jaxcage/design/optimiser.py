@@ -21,26 +21,16 @@ from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
 from ..lanes import sobol
 from ..models import AbstractForcedSystem
-from .check import Checked, check_design
 from .design_space import DesignSpace, Value, function_value
 from .operating import KEPT, OperatingRange, UnstableWidth
-from .requirements import (
-    Budget,
-    Cost,
-    Requirement,
-    Requirements,
-    Tolerance,
-    cost_function,
-    listed,
-    widened,
-)
+from .requirements import Budget, Cost, Requirement, Requirements, Tolerance, cost_function, listed, widened
+from .verdict import Checked, check_design
 
 
 AT_BOUND = 1e-6  # distance from a bound, relative to the span, at which a parameter counts as at the bound
 WIDEST = 4.0  # largest multiple of a tolerance that is tried
 LOST = 10.0  # violation of every requirement at a trial without values
 ACTIVE = 5e-3  # slack below which a requirement counts as active
-NEAR_STOP = 0.03  # distance, relative to the spans, within which a trial that lost an edge limits the design
 ITERATIONS, ACCURACY = 30, 1e-4
 FIRST_RADIUS, LARGEST_RADIUS, LEAST_RADIUS = 0.1, 0.4, 2e-3  # trust region, relative to the spans
 PENALTY = 10.0  # penalty of a violation by 1, relative to the cost of the given design
@@ -71,8 +61,7 @@ class Design:
         prevent a feasible design, empty if there is one.
     - `prices`: cost of one unit more of each binding requirement (Lagrange multipliers).
     - `at_bound`: parameters at a bound; `worst`: value of each requirement for the worst bearing within the tolerances.
-    - `stopped_by`: reason why a nearby design lost an edge, empty if none did; `notes`: edges that were replaced.
-    - `budget`: admissible width of each tolerance.
+    - `notes`: edges that were replaced; `budget`: admissible width of each tolerance.
     - `evaluations`: number of designs whose edges were solved for; `checked`: simulations from many initial states.
     """
 
@@ -90,7 +79,6 @@ class Design:
     at_bound: tuple[str, ...]
     worst: dict[str, Value]
     budget: list[Budget]
-    stopped_by: str
     notes: tuple[str, ...]
     evaluations: int
     path: list[dict[str, float]]
@@ -115,30 +103,23 @@ class Design:
         return "\n".join(rows)
 
 
+@dataclasses.dataclass
 class Problem:
-    """Trials of one search, each computed once.
+    """Trials of one search, each computed once, and the values of each design whose edges were solved for."""
 
-    **Arguments:** operating range, or width of unstable ranges, which is then the cost; requirements; cost; mask of
-    what varies; tolerances.
-    """
-
-    def __init__(
-        self,
-        range_: OperatingRange | UnstableWidth,
-        wanted: list[Requirement],
-        cost: Callable[[Any], Any] | None,
-        free: np.ndarray,
-        tolerance: dict[str, Tolerance],
-    ):
-        self.space, self.operating, self.wanted, self.free = range_.space, range_.operating, wanted, free
-        self.range, self.cost, self.tolerance = range_, cost, tolerance
-        self.trials: dict[bytes, Trial] = {}
-        self.solved: dict[bytes, dict[str, Value] | str] = {}
+    range: OperatingRange | UnstableWidth
+    wanted: list[Requirement]
+    cost: Callable[[Any], Any] | None
+    """None for the width of the unstable ranges."""
+    free: np.ndarray
+    """True for parameters that vary."""
+    tolerance: dict[str, Tolerance]
+    trials: dict[bytes, Trial] = dataclasses.field(default_factory=dict)
+    solved: dict[bytes, dict[str, Value] | str] = dataclasses.field(default_factory=dict)
 
     @property
-    def evaluations(self) -> int:
-        """Number of designs whose edges were solved for."""
-        return len(self.solved)
+    def space(self) -> DesignSpace:
+        return self.range.space
 
     def at(self, place: np.ndarray) -> Trial:
         """Trial at a place, computed if need be."""
@@ -452,7 +433,6 @@ def _described(problem: Problem, best: np.ndarray, checked: Checked | None) -> D
     trial, own, x = problem.at(best), problem.at(space.place), best[problem.free]
     names = np.array(space.names)[problem.free].tolist()
     slack, prices, conflict = trial.slack, dict[str, float](), tuple[str, ...]()
-    near = [t for t in problem.trials.values() if t.lost and float(np.max(np.abs(t.place - best))) < NEAR_STOP]
     feasible = not trial.lost and bool(np.all(slack >= -KEPT))
     if feasible:
         binding = np.flatnonzero(slack < ACTIVE)
@@ -476,9 +456,8 @@ def _described(problem: Problem, best: np.ndarray, checked: Checked | None) -> D
         at_bound=tuple(n for n, v in zip(names, x, strict=True) if min(v, 1 - v) < AT_BOUND),
         worst=trial.worst,
         budget=_budget(problem, trial) if wanted and feasible else [],
-        stopped_by=near[-1].lost if near else "",
         notes=tuple(dict.fromkeys(problem.range.handed_over)),
-        evaluations=problem.evaluations,
+        evaluations=len(problem.solved),
         path=[space.values(t.place) | {"cost": t.cost} for t in problem.trials.values() if not t.lost],
         checked=checked,
     )

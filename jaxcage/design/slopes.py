@@ -15,10 +15,11 @@ from jaxtyping import Float
 from .._arguments import require_at_least
 from .._errors import ArgumentError, InputError
 from .._parameters import parameters, replace
+from ..analysis import scatter
 from ..models import AbstractForcedSystem
 from ..orbits import Sensitivity
 from ..quantities import notebook_html
-from .statistics import STATISTICS, Runs, Statistic, mean_and_error, statistics_of
+from .statistics import STATISTICS, Runs, Statistic, statistics_of
 
 
 DIRECTIONS = (
@@ -106,11 +107,10 @@ def _deviation(weight: np.ndarray, covariance: np.ndarray) -> float:
 @dataclasses.dataclass(frozen=True)
 class StatisticGradient(Slopes):
     """Slopes of a statistic, the mean over all designs and initial states; `drift`, the last block's mean minus the
-    first's, NaN for one block; `explained`, the share of the scatter of the pairs due to the slopes."""
+    first's, and its error, NaN for one block."""
 
     drift: float
     drift_error: float
-    explained: float
 
     @property
     def settled(self) -> bool:
@@ -245,12 +245,11 @@ def gradient_of_pairs(
     slopes = bread @ half
     left = half - moved @ slopes
     weighted = bread * (left / (1 - np.einsum("ij,ji->i", moved, bread)))  # HC3
-    value, error = mean_and_error(both.mean(axis=0))
+    each = both.mean(axis=0)
     covariance = np.zeros((1 + slopes.size,) * 2)
-    covariance[0, 0], covariance[1:, 1:] = error**2, weighted @ weighted.T
-    total = float(np.sum(half * half))
-    explained = 1 - float(np.sum(left * left)) / total if total > 0 else math.nan
-    return StatisticGradient(name, unit, value, directions, slopes, covariance, *mean_and_error(drift), explained)
+    covariance[0, 0], covariance[1:, 1:] = scatter(each) ** 2, weighted @ weighted.T
+    known = float(each.mean()), directions, slopes, covariance
+    return StatisticGradient(name, unit, *known, float(drift.mean()), float(scatter(drift)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -268,11 +267,6 @@ class ToleranceBudget:
     def total(self) -> float:
         """Standard deviation due to all parameters, taken as independent."""
         return math.hypot(*self.deviation.values())
-
-    @property
-    def unclear(self) -> tuple[str, ...]:
-        """Parameters whose deviation is at most twice its error, if it has one."""
-        return tuple(name for name, x in self.deviation.items() if x <= 2 * self.error[name] > 0)
 
     def __str__(self) -> str:
         order = sorted(self.deviation.items(), key=lambda item: -item[1])

@@ -18,10 +18,9 @@ from scipy.special import expit
 
 from .._errors import ArgumentError
 from .._pytrees import compiled
-from ..analysis import CHAOS_THRESHOLD, LAND_LOADS, failed, land_loads
+from ..analysis import CHAOS_THRESHOLD, LAND_LOADS, failed, land_loads, scatter
 from ..lanes import Plan, Progress, Run, Speeds, run_lanes
 from ..models import AbstractForcedSystem, CageModel, drawn_places, rolling_start
-from ..solve import AbstractMethod
 from .design_space import Models
 from .requirements import cost_function
 
@@ -53,69 +52,62 @@ SPREAD = 0.6
 """Fraction of the clearance over which initial states of a cage are drawn."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
 class Runs:
-    """Settings of the runs from which statistics of designs are computed."""
+    """Speeds, initial states and settings of the runs from which statistics of designs are computed."""
 
-    speeds: Speeds
-    """Ascending speeds [rad/s], for a whole bearing those of its shaft."""
-    initial_states: Any = 1
-    """Number of the model's own initial states, or the initial states of every design."""
-    discard: int = 150
-    revolutions: int = 100
-    blocks: int = 1
-    exponents: int = 1
-    tolerance: float | None = None
-    method: AbstractMethod | None = None
-    seed: int | None = None
-    """Seed for `initial_states` random initial states in place of the model's own."""
-    progress: Progress | None = None
-    keep: int = 1
-    settled: int = 0
-
-    def __post_init__(self):
-        if self.revolutions < self.blocks or self.revolutions % self.blocks:
-            said = f"must be a multiple of {self.blocks} above 0, but {self.revolutions} was given."
+    def __init__(
+        self,
+        speeds: Speeds,
+        initial_states: Any = 1,
+        *,
+        discard: int = 150,
+        revolutions: int = 100,
+        blocks: int = 1,
+        seed: int | None = None,
+        progress: Progress | None = None,
+        **more: Any,
+    ):
+        """**Arguments:** ascending speeds [rad/s], for a whole bearing those of its shaft; number of the model's own
+        initial states, or the initial states of every design; seed for as many random ones in place of the model's own;
+        progress as in `sweep`; settings of `jaxcage.lanes.Run`."""
+        if revolutions < blocks or revolutions % blocks:
+            said = f"must be a multiple of {blocks} above 0, but {revolutions} was given."
             raise ArgumentError("revolutions", said=said)
+        self.speed = np.atleast_1d(np.asarray(speeds, dtype=float))
+        self.initial_states, self.seed, self.progress = initial_states, seed, progress
+        length = {"discard": discard, "revolutions": revolutions, "blocks": blocks}
+        self.settings: dict[str, Any] = {"exponents": 1, "keep": 1, **length, **more}
 
     @classmethod
-    def of_bearing(cls, speeds: Speeds, initial_states: Any = 4, discard: int = 10, revolutions: int = 20, **more: Any):
+    def of_bearing(cls, speeds: Speeds, initial_states: Any = 4, **more: Any) -> "Runs":
         """Runs of a whole bearing in two blocks, from random positions of its cage; peaks are maxima of a block."""
-        usual = {"blocks": 2, "exponents": 0, "tolerance": 1e-4, "seed": 0}
-        return cls(speeds, initial_states, discard, revolutions, **usual | more)
+        length = {"discard": 10, "revolutions": 20, "blocks": 2}
+        usual: dict[str, Any] = {**length, "exponents": 0, "tolerance": 1e-4, "seed": 0}
+        return cls(speeds, initial_states, **usual | more)
 
     def fresh(self, number: int = 1, initial_states: int = 8) -> "Runs":
         """Independent runs for a check: other random initial states, twice as many speeds elsewhere in the range, twice
         as many discarded revolutions, and a tenth of the tolerance. Each `number` from 1 on gives another draw."""
-        speeds, seed = self.speed, (self.seed or 0) + number
+        speeds, seed, finer = self.speed, (self.seed or 0) + number, dict(self.settings)
         if (n := 2 * speeds.size) > 2:
             share = (np.arange(n) + np.random.default_rng(seed).uniform(size=n)) / n
             share[-1] = 1.0  # the balance grade is that of the highest speed
             speeds = speeds[0] + share * (speeds[-1] - speeds[0])
-        finer = {"discard": 2 * self.discard, "tolerance": self.tolerance and self.tolerance / 10}
-        return dataclasses.replace(
-            self, speeds=speeds, initial_states=initial_states, seed=seed, progress=None, **finer
-        )
-
-    @property
-    def speed(self) -> Float[np.ndarray, " speeds"]:
-        """Speeds [rad/s] as an array."""
-        return np.atleast_1d(np.asarray(self.speeds, dtype=float))
+        finer["discard"] *= 2
+        if finer.get("tolerance"):
+            finer["tolerance"] /= 10
+        return Runs(speeds, initial_states, seed=seed, **finer)
 
     def run(self, models: Models) -> xr.Dataset:
         """Sweep of some designs."""
-        names = ("discard", "revolutions", "blocks", "exponents", "tolerance", "method", "keep", "settled")
-        settings = {name: getattr(self, name) for name in names}
-        initial_states = (
-            self.initial_states if self.seed is None else [(0.0,) * models[0].dimension] * self.initial_states
-        )
-        plan = Plan.over_speed(list(models), self.speed, initial_states)
-        if self.seed is not None:
-            drawn = np.concatenate(
-                [drawn_states(model, self.speed, self.initial_states, self.seed) for model in models]
-            )
-            plan = dataclasses.replace(plan, states=drawn.reshape(plan.states.shape))
-        return run_lanes(plan, Run.of(models[0], confirm=False, horizon=0, **settings), self.progress)
+        run = Run.of(models[0], **self.settings | {"confirm": False, "horizon": 0})
+        if self.seed is None:
+            plan = Plan.over_speed(list(models), self.speed, self.initial_states)
+        else:
+            drawn = [drawn_states(model, self.speed, self.initial_states, self.seed) for model in models]
+            plan = Plan.over_speed(list(models), self.speed, [(0.0,) * models[0].dimension] * self.initial_states)
+            plan = dataclasses.replace(plan, states=np.concatenate(drawn).reshape(plan.states.shape))
+        return run_lanes(plan, run, self.progress)
 
 
 def drawn_states(
@@ -242,7 +234,7 @@ def bearing_objective(model: AbstractForcedSystem, runs: Runs, prices: Mapping[s
 @dataclasses.dataclass(frozen=True)
 class BeforeAfter:
     """Statistic of two designs from the same initial states, and its change, with standard errors from the scatter of
-    runs and of their differences; NaN for a single one."""
+    runs and of their differences; infinite for a single one."""
 
     name: str
     unit: str
@@ -276,19 +268,13 @@ def before_and_after(
     pair, rows = [before, after], []
     found = runs.run(pair)
     if isinstance(before, CageModel):
-        loads: Any = land_loads(pair, found, runs.method)  # pyright: ignore[reportArgumentType]
+        loads: Any = land_loads(pair, found, runs.settings.get("method"))  # pyright: ignore[reportArgumentType]
         found = found.assign({name: (found["label"].dims, load) for name, load in loads.items()})
     for name, each in statistics_of(before, statistics).items():
         values = np.broadcast_to(each.samples(pair, found).mean(axis=3), failed(found).shape)
         known = np.all(np.isfinite(values), axis=0)
         some = np.any(known, axis=0)
         a, b = (np.average(np.where(known, x, 0.0)[:, some], axis=0, weights=known[:, some]) for x in values)
-        numbers = [number for x in (a, b, b - a) for number in mean_and_error(x)]
+        numbers = [float(number) for x in (a, b, b - a) for number in (np.mean(x), scatter(x))]
         rows.append(BeforeAfter(name, each.unit, *numbers))
     return rows, int(failed(found).sum())
-
-
-def mean_and_error(x: Float[np.ndarray, " n"]) -> tuple[float, float]:
-    """Mean of independent numbers and its standard error; NaN for too few."""
-    mean = float(x.mean()) if x.size else math.nan
-    return mean, float(x.std(ddof=1) / math.sqrt(x.size)) if x.size > 1 else math.nan

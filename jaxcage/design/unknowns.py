@@ -24,9 +24,9 @@ from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
 from ..analysis import failed, motions, restless
 from ..files import Measurement, Range, Unknown, check_together
-from ..lanes import Progress, sobol
+from ..lanes import sobol
 from ..models import CageModel
-from ..solve import AbstractMethod, native
+from ..solve import native
 from .statistics import Runs
 
 
@@ -37,11 +37,12 @@ SETTLED = 64
 ERROR = 1e-2
 """Largest accepted error of a revolution [clearances]; with the default, a quarter of the draws would fail."""
 RARE = 0.05
-"""Chance up to which a speed is called calm; from 1 - RARE on it is called chaotic."""
+"""Largest share of the draws that may disagree with a verdict."""
+RANGE_SPEEDS = 32
+"""Number of speeds of an operating range at which draws are simulated."""
 FEWEST = 29
 """Least number of draws for a verdict and for indices: at a chance of 10 %, this many contain no chaotic one in 5 % of
 cases."""
-CONFIDENCE = 0.95
 BINS = 4
 """Number of parts of a range whose chances are compared, to estimate how much an unknown explains."""
 KEPT = 0.25
@@ -58,7 +59,7 @@ WHOLE = 0.9
 
 
 def _run_draws(
-    model: CageModel, unknowns: Sequence[Unknown], place: np.ndarray, speeds: Any, method: Any, **more: Any
+    model: CageModel, unknowns: Sequence[Unknown], place: np.ndarray, speeds: Any, **more: Any
 ) -> tuple[list[CageModel], xr.Dataset]:
     """Designs with the values at `place` in the ranges, and their sweep, each from its own conventional initial state:
     the cage of one design, at rest on its rib, would penetrate that of another."""
@@ -68,8 +69,9 @@ def _run_draws(
         models.append(replace(model, **values))
         check_together(models[-1])
     given: dict[str, Any] = {"discard": REVOLUTIONS, "revolutions": REVOLUTIONS, "blocks": 20, "keep": 32} | more
-    settled, method = SETTLED if given["discard"] >= SETTLED else 0, method or native(error=ERROR)
-    return models, Runs(speeds, settled=settled, method=method, **given).run(models)
+    given["method"] = given.get("method") or native(error=ERROR)
+    settled = SETTLED if given["discard"] >= SETTLED else 0
+    return models, Runs(speeds, settled=settled, **given).run(models)
 
 
 def _require_some(unknowns: Sequence[Unknown]) -> None:
@@ -79,18 +81,52 @@ def _require_some(unknowns: Sequence[Unknown]) -> None:
 
 # --- chances --------------------------------------------------------------------------------------------------------
 
-Verdict = Literal["calm", "chaotic", "calm as computed", "chaotic as computed", "not decided", "too few draws"]
+State = Literal["calm", "rattles", "not decided"]
+
+
+class Chance(NamedTuple):
+    """Numbers of draws that are chaotic, at one speed or anywhere in a range, of those for which this is known, and of
+    all."""
+
+    chaotic: int
+    known: int
+    draws: int
+
+    @property
+    def share(self) -> float:
+        """Share of the known draws that are calm; NaN if none is known."""
+        return 1 - self.chaotic / self.known if self.known else math.nan
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the calm share (Clopper and Pearson), whatever the failed draws would do."""
+        from scipy.stats import beta  # takes half a second to load
+
+        least, most = self.known - self.chaotic, self.draws - self.chaotic
+        low = beta.ppf(0.025, least, self.draws - least + 1) if least else 0.0
+        high = beta.ppf(0.975, most + 1, self.draws - most) if most < self.draws else 1.0
+        return float(low), float(high)
+
+    @property
+    def state(self) -> State:
+        """`calm` or `rattles` if at least 95 % of the draws agree, whatever the failed ones would do, else `not
+        decided`."""
+        if self.known >= FEWEST:
+            if self.draws - (self.known - self.chaotic) <= RARE * self.draws:
+                return "calm"
+            if self.chaotic >= (1 - RARE) * self.draws:
+                return "rattles"
+        return "not decided"
 
 
 class Index(NamedTuple):
     """First-order index of an unknown value: the share of the variance of an outcome that it explains alone, with its
-    standard error; how to measure it; mean outcome in the lowest and highest quarter of its range."""
+    standard error; how to measure it."""
 
     label: str
     share: float
     error: float
     source: str
-    quarters: tuple[float, float]
 
     @property
     def telling(self) -> bool:
@@ -119,62 +155,29 @@ class Ensemble:
         return self.speed * 30 / np.pi
 
     @property
-    def counts(self) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers of chaotic and of finished draws at each speed."""
-        return np.sum(self.chaotic & ~self.failed, axis=0), np.sum(~self.failed, axis=0)
+    def chances(self) -> list[Chance]:
+        """Chances at each speed alone."""
+        counts = np.sum(self.chaotic & ~self.failed, axis=0), np.sum(~self.failed, axis=0)
+        return [Chance(int(k), int(n), len(self.place)) for k, n in zip(*counts, strict=True)]
 
     @property
-    def chance(self) -> Float[np.ndarray, " speeds"]:
-        """Share of the draws that are chaotic at each speed; NaN where none finished."""
-        chaotic, of = self.counts
-        return np.where(of > 0, chaotic / np.maximum(of, 1), np.nan)
-
-    @property
-    def interval(self) -> tuple[Float[np.ndarray, " speeds"], Float[np.ndarray, " speeds"]]:
-        """95 % bounds of the chance (Clopper and Pearson), with failed draws counted as calm in the lower and as
-        chaotic in the upper one."""
-        (chaotic, of), draws = self.counts, len(self.place)
-        return binomial_interval(chaotic, draws)[0], binomial_interval(chaotic + draws - of, draws)[1]
-
-    @property
-    def verdict(self) -> list[Verdict]:
-        """Verdict at each speed, see `verdict_of`."""
-        return [verdict_of(int(k), int(n), len(self.place)) for k, n in zip(*self.counts, strict=True)]
-
-    def between(self, low_rpm: float, high_rpm: float) -> Bool[np.ndarray, " speeds"]:
-        """True for the speeds in a range or, if there are none, for the one nearest to its lower end."""
-        inside = (self.rpm >= low_rpm) & (self.rpm <= high_rpm)
-        return inside if np.any(inside) else np.arange(self.rpm.size) == np.argmin(np.abs(self.rpm - low_rpm))
+    def chance_of_chaos(self) -> Float[np.ndarray, "speeds 3"]:
+        """Share of the draws that are chaotic at each speed, NaN where none finished, and its 95 % bounds."""
+        return np.array([[1 - calm for calm in (each.share, *each.interval[::-1])] for each in self.chances])
 
 
-def verdict_of(chaotic: int, finished: int, draws: int) -> Verdict:
-    """Verdict from the numbers of `chaotic`, `finished` and all `draws`.
-
-    `calm` and `chaotic` hold whatever the failed draws would do: at most 5 %, or at least 95 %, of all draws are
-    chaotic. `calm as computed` and `chaotic as computed` concern the finished draws only; failed ones often hit the
-    land hardest, and other draws in their place would not represent them.
-    """
-    if finished < FEWEST:
-        return "too few draws"
-    if chaotic + draws - finished <= RARE * draws:
-        return "calm"
-    if chaotic >= (1 - RARE) * draws:
-        return "chaotic"
-    if chaotic <= RARE * finished:
-        return "calm as computed"
-    return "chaotic as computed" if chaotic >= (1 - RARE) * finished else "not decided"
+Draws = Bool[np.ndarray, " draws"]
 
 
-def binomial_interval(
-    hits: np.ndarray | Sequence[int] | int, of: np.ndarray | Sequence[int] | int
-) -> tuple[np.ndarray, np.ndarray]:
-    """95 % bounds (Clopper and Pearson) of a share, from `hits` among `of`."""
-    from scipy.stats import beta  # takes half a second to load
-
-    k, n, tail = np.asarray(hits, dtype=float), np.asarray(of, dtype=float), (1 - CONFIDENCE) / 2
-    low = np.where(k > 0, beta.ppf(tail, np.maximum(k, 1e-9), n - k + 1), 0.0)
-    high = np.where(k < n, beta.ppf(1 - tail, k + 1, np.maximum(n - k, 1e-9)), 1.0)
-    return low, high
+def range_chance(found: Ensemble, low_rpm: float, high_rpm: float) -> tuple[Chance, Draws, Draws]:
+    """Chance that a draw is calm at all speeds of a range [rpm]; True for draws that are chaotic in it, and for those
+    of which this is known. If there is no speed in the range, that nearest to its lower end counts."""
+    which = (found.rpm >= low_rpm) & (found.rpm <= high_rpm)
+    if not which.any():
+        which[np.argmin(np.abs(found.rpm - low_rpm))] = True
+    chaotic = np.any(found.chaotic[:, which] & ~found.failed[:, which], axis=1)
+    known = chaotic | ~np.any(found.failed[:, which], axis=1)
+    return Chance(int(chaotic.sum()), int(known.sum()), len(chaotic)), chaotic, known
 
 
 def indices(found: Ensemble, outcome: Shaped[np.ndarray, " draws"], known: Bool[np.ndarray, " draws"]) -> list[Index]:
@@ -186,8 +189,7 @@ def indices(found: Ensemble, outcome: Shaped[np.ndarray, " draws"], known: Bool[
     picks = np.random.default_rng(0).integers(len(y), size=(RESAMPLED, len(y)))
     for unknown, place, source in zip(found.unknowns, found.place[known].T, found.sources, strict=True):
         error = float(np.std([_explained(place[p], y[p]) for p in picks]))
-        quarters = float(y[place < 0.25].mean()), float(y[place > 0.75].mean())
-        rows.append(Index(unknown.label, _explained(place, y), error, source, quarters))
+        rows.append(Index(unknown.label, _explained(place, y), error, source))
     return sorted(rows, key=lambda row: -row.share)
 
 
@@ -207,27 +209,24 @@ def ensemble(
     *,
     draws: int = 64,
     seed: int = 0,
-    discard: int = REVOLUTIONS,
-    revolutions: int = REVOLUTIONS,
-    method: AbstractMethod | None = None,
-    **more: Any,
+    **settings: Any,
 ) -> Ensemble:
     """Run `draws` designs, spread evenly over the ranges, over speed.
 
     **Arguments:** design; its unknowns; ascending speeds [rad/s]; number and seed of the draws (scrambled Sobol
-    points); revolutions discarded and observed; method; more settings of `Runs`.
+    points); settings of `Runs`, by default with 100 revolutions discarded and 100 observed.
 
     **Raises:** `ValueError` if nothing is unknown, nothing is drawn, or values from the ranges are not compatible.
     """
     _require_some(unknowns)
     require_at_least(1, draws=draws)
     place, info = sobol(len(unknowns), draws, seed), parameter_info(model)
-    more |= {"discard": discard, "revolutions": revolutions}
-    _, found = _run_draws(model, unknowns, place, speeds, method, **more)
+    _, found = _run_draws(model, unknowns, place, speeds, **settings)
     place = place[: found.sizes["design"]]  # fewer after a stop
     rough, lost, at = restless(found), failed(found)[..., 0], np.asarray(speeds, dtype=float)
     sources, units = zip(*((info[u.names[0]].source, info[u.names[0]].unit) for u in unknowns), strict=True)
-    return Ensemble(tuple(unknowns), sources, place, at, rough, lost, discard, revolutions, units)
+    length = found.attrs["discard"], found.attrs["revolutions"]
+    return Ensemble(tuple(unknowns), sources, place, at, rough, lost, *length, units)
 
 
 # --- measurements ---------------------------------------------------------------------------------------------------
@@ -317,14 +316,12 @@ def misses(
     unknowns: Sequence[Unknown],
     measured: Sequence[Measurement],
     place: Float[np.ndarray, "draws unknowns"],
-    *,
-    method: AbstractMethod | None = None,
-    progress: Progress | None = None,
+    **settings: Any,
 ) -> Float[np.ndarray, "draws measurements"]:
     """Distance of each draw from each measurement, in tolerances; NaN where it failed. For the motions `rattles`
-    (chaos) and `calm` it is 0 if the draw agrees, else `FAR`."""
+    (chaos) and `calm` it is 0 if the draw agrees, else `FAR`. Settings are those of `Runs`."""
     rpm = np.unique([m.cage_rpm for m in measured])
-    models, found = _run_draws(model, unknowns, place, rpm * np.pi / 30, method, progress=progress)
+    models, found = _run_draws(model, unknowns, place, rpm * np.pi / 30, **settings)
     size, order = motions(models, found, method=native(error=ERROR))
     columns = []
     for m in measured:

@@ -1,7 +1,6 @@
 """Sobol indices: shares of the variance of a value over ranges of parameters, with bootstrap intervals."""
 
 import dataclasses
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -23,7 +22,7 @@ RESAMPLES, TAIL = 2000, 2.5
 
 @dataclasses.dataclass(frozen=True)
 class SobolIndices:
-    """First-order and total Sobol indices with 95 % bootstrap intervals; numbers of evaluations and base samples.
+    """First-order and total Sobol indices with 95 % bootstrap intervals, and the number of evaluations.
     `scatter` is the share of the motion itself, from the blocks of each run: it belongs to no parameter, but total
     indices contain it. Drift between the blocks counts as scatter."""
 
@@ -32,7 +31,6 @@ class SobolIndices:
     first_interval: dict[str, tuple[float, float]]
     total_interval: dict[str, tuple[float, float]]
     evaluations: int
-    samples: int
     scatter: float = 0.0
 
     @property
@@ -42,20 +40,6 @@ class SobolIndices:
         bad = lambda value, pair: not (pair[0] <= 1 and pair[1] >= 0 and pair[1] - pair[0] <= max(abs(value), NARROW))
         return tuple(n for n in self.first if any(bad(value[n], pair[n]) for value, pair in rows))
 
-    @property
-    def warning(self) -> str | None:
-        """Warning of wide intervals, with the number of samples that should make them `NARROW`; None if there are
-        none."""
-        if not self.doubtful:
-            return None
-        widest = max(b - a for pairs in (self.first_interval, self.total_interval) for a, b in pairs.values())
-        # Widths fall with the root of the number of samples.
-        wanted = max(2 * self.samples, 1 << math.ceil(math.log2(self.samples * max(widest / NARROW, 1.0) ** 2)))
-        return (
-            f"Too few samples to believe the indices of {', '.join(self.doubtful)}: shares of a variance lie between 0 "
-            f"and 1. With {wanted} base samples (now {self.samples}) their intervals would be about {NARROW:g} wide."
-        )
-
     def __str__(self) -> str:
         span = lambda pair: f"[{pair[0]:+.2f}, {pair[1]:+.2f}]"
         rows = [
@@ -63,7 +47,7 @@ class SobolIndices:
             f"total {self.total[n]:+.3f} {span(self.total_interval[n])}"
             for n in self.first
         ]
-        return "\n".join([f"Sobol indices from {self.evaluations} designs", *rows, *filter(None, [self.warning])])
+        return "\n".join([f"Sobol indices from {self.evaluations} designs", *rows])
 
 
 def global_sensitivity(
@@ -111,4 +95,4 @@ def global_sensitivity(
     variance, noise = float(np.var(f)), 0.0
     if by_block.shape[1] > 1 and variance > 0:
         noise = min(1.0, float(np.mean(scatter(by_block) ** 2)) / variance)
-    return SobolIndices(first, total, interval(0), interval(1), f.size, samples, noise)
+    return SobolIndices(first, total, interval(0), interval(1), f.size, noise)

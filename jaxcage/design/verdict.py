@@ -1,26 +1,30 @@
-"""Verdict on an operating range: whether a cage stays calm, how certain that is, and what would change it.
+"""How far a design is from a loss of stability, what would change that, and where its simulations end.
 
-Two independent results are combined. The best guess of the design has a stable range of speed with exact edges: the
-distance of the operating range from them is its margin, with exact derivatives. Unknown values are drawn from their
-ranges, and each draw is simulated over the operating range: the share of draws that are chaotic somewhere in it is a
-joint probability, with a binomial error bar.
+The best guess of a design has a stable range of speed with exact edges: the distance of an operating range from them is
+its margin, with exact derivatives. A stable orbit need not attract every initial state, so that the design is also
+simulated over the range from many of them.
 """
 
 import dataclasses
-from typing import Any, Literal, NamedTuple
+import json
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from .._errors import InputError
 from .._parameters import EXTRA, parameter_info, parameters
+from ..analysis import restless, survival_at
+from ..lanes import states_at, sweep
+from ..models import AbstractForcedSystem
 from .design_space import DesignSpace, Value
 from .operating import OperatingRange
-from .unknowns import Ensemble, binomial_interval, verdict_of
+from .statistics import drawn_states
 
 
-RANGE_SPEEDS = 32
-"""Number of speeds of the operating range at which draws are simulated."""
+SPEEDS = 24
+"""Number of speeds of the operating range at which a design is simulated."""
 STEP = 0.1
 """Relative change of a parameter for which effects are given."""
 KELVINS = 10.0
@@ -30,48 +34,6 @@ SMALL = 0.02
 TURNED = "drawing", "operating"
 """Kinds of parameters that a designer or a user of the bearing can change."""
 ENDS = "lower", "upper"
-
-State = Literal["calm", "rattles", "not decided"]
-
-
-class RangeChance(NamedTuple):
-    """Numbers of draws that are chaotic at one or more speeds of a range, of those for which this is known, and of
-    all."""
-
-    chaotic: int
-    known: int
-    draws: int
-
-    @property
-    def share(self) -> float:
-        """Share of the known draws that are calm over the whole range; NaN if none is known."""
-        return 1 - self.chaotic / self.known if self.known else float("nan")
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % interval of the calm share, whatever the failed draws would do."""
-        unknown = self.draws - self.known
-        high = 1 - float(binomial_interval(self.chaotic, self.draws)[0])
-        return 1 - float(binomial_interval(self.chaotic + unknown, self.draws)[1]), high
-
-    @property
-    def state(self) -> State:
-        """`calm` or `rattles` if at least 95 % of the draws agree, whatever the failed ones would do, else `not
-        decided`."""
-        words: dict[str, State] = {"calm": "calm", "chaotic": "rattles"}
-        return words.get(verdict_of(self.chaotic, self.known, self.draws), "not decided")
-
-
-Draws = Bool[np.ndarray, " draws"]
-
-
-def range_chance(found: Ensemble, low_rpm: float, high_rpm: float) -> tuple[RangeChance, Draws, Draws]:
-    """Chance that a draw is calm at all speeds of a range [rpm]; True for draws that are chaotic in it, and for those
-    of which this is known."""
-    which = found.between(low_rpm, high_rpm)
-    chaotic = np.any(found.chaotic[:, which] & ~found.failed[:, which], axis=1)
-    known = chaotic | ~np.any(found.failed[:, which], axis=1)
-    return RangeChance(int(chaotic.sum()), int(known.sum()), len(chaotic)), chaotic, known
 
 
 @dataclasses.dataclass(frozen=True)
@@ -157,3 +119,68 @@ def margins(model: Any, operating: tuple[float, float]) -> Margins | str:
     with np.errstate(divide="ignore"):
         decay = float(-1 / np.log(largest)) if largest < 1 else float("inf")
     return Margins(own["lower"], own["upper"], decay, tuple(turned), np.array([known[n] for n in turned]))
+
+
+# --- simulations ----------------------------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True)
+class Checked:
+    """Results of simulations of a design over speeds [rpm] of its operating range: shares of the trajectories by label,
+    the speeds at which some are chaotic, and the mean life of chaos there [revolutions], infinite where none ended, and
+    NaN after a stop."""
+
+    speeds_rpm: Float[np.ndarray, " speeds"]
+    initial_states: int
+    shares: dict[str, float]
+    chaotic_rpm: Float[np.ndarray, " chaotic"]
+    mean_life: Float[np.ndarray, " chaotic"]
+    method: str
+
+    @property
+    def calm(self) -> bool:
+        """True if every trajectory ended on a period-1 orbit."""
+        return self.shares.get("periodic-1") == 1.0
+
+    @property
+    def state(self) -> str:
+        """The verdict `calm` or `not calm`; `not decided` if some trajectories failed and all others are calm."""
+        others = self.shares.keys() - {"periodic-1", "failed"}
+        return "calm" if self.calm else "not calm" if others else "not decided"
+
+    def __str__(self) -> str:
+        share = 100 * self.shares.get("periodic-1", 0.0)
+        said = f"{share:.1f} % of {self.initial_states} initial states at {self.speeds_rpm.size} speeds end calm"
+        if not self.chaotic_rpm.size:
+            return said
+        low, high = f"{self.chaotic_rpm.min():.0f}", f"{self.chaotic_rpm.max():.0f} rpm of the cage"
+        ends = self.mean_life.min(), self.mean_life.max()
+        lasts = " to ".join(f"{x:.0f}" if np.isfinite(x) else "no end seen" for x in ends)
+        where = f"at {self.chaotic_rpm.size} of the speeds, {low} to {high}"
+        said = f"{said}; chaos coexists {where}"
+        return said if np.isnan(ends[0]) else f"{said}, with a mean life of {lasts} revolutions"
+
+
+def check_design(
+    model: AbstractForcedSystem,
+    operating: tuple[float, float],
+    initial_states: int = 16,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Checked:
+    """Simulate a design over its operating range [rad/s] from its own and random initial states, `initial_states` in
+    all.
+
+    Steps are adaptive, in machine code, and thus independent of those of the orbits in the search.
+    """
+    speeds = np.linspace(*operating, SPEEDS)
+    own = np.asarray(states_at(model, speeds, None))[:, :initial_states]
+    states = np.concatenate([own, drawn_states(model, speeds, initial_states - own.shape[1], 0)], axis=1)
+    told = (lambda done, of: progress("check", done, of)) if progress else None
+    found = sweep(model, speeds, initial_states=states, progress=told)
+    labels, counts = np.unique(found["label"].values, return_counts=True)
+    shares = dict(zip(labels.tolist(), (counts / counts.sum()).tolist(), strict=True))
+    rpm, where = found["rpm"].values, np.flatnonzero(restless(found))
+    followed = "escape" in found  # not after a stop
+    lives = np.array([survival_at(found, int(i)).mean_life if followed else np.nan for i in where])
+    method = json.loads(found.attrs["settings"])["method"]
+    return Checked(rpm, states.shape[1], shares, rpm[where], lives, method)

@@ -21,7 +21,6 @@
 """
 
 from .chance_tables import (
-    chances_document as chances_document,
     chances_notes as chances_notes,
     chances_table as chances_table,
     measured_table as measured_table,

@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -11,25 +10,18 @@ from ..files import Measurement, Range
 from .tables import SHOWN, Beside, Column, Table, chosen, factor, speed_columns, table
 
 
-def chances_document(found: Ensemble) -> dict[str, Any]:
-    """Chances of chaos by speed for a JSON document."""
-    names = ("chance_lower", "chance_upper", "chaotic_draws", "finished_draws")
-    counts = dict(zip(names, (*found.interval, *found.counts), strict=True))
-    failed = {"draws": len(found.place), "failed": int(np.sum(found.failed)), "speeds_rpm": found.rpm}
-    return failed | {"chance_of_chaos": found.chance, **counts, "verdict": found.verdict}
-
-
 def chances_table(name: str, found: Ensemble, beside: Beside = None) -> Table:
     """Table of the chances at each speed alone, with neighbouring speeds of one verdict in one row."""
-    (low, high), verdicts, lost = found.interval, found.verdict, len(found.place) - found.counts[1]
+    states, shares = [each.state for each in found.chances], 100 * found.chance_of_chaos
+    lost = np.sum(found.failed, axis=0)
     span = lambda x, unit="": " to ".join(dict.fromkeys(f"{end:.0f}" for end in (np.min(x), np.max(x)))) + unit
     rows = []
-    for verdict, places in itertools.groupby(range(len(verdicts)), key=verdicts.__getitem__):
+    for state, places in itertools.groupby(range(len(states)), key=states.__getitem__):
         part = list(places)
-        known = found.chance[part][np.isfinite(found.chance[part])]
+        known = shares[part, 0][np.isfinite(shares[part, 0])]
         row = {"from": float(found.rpm[part[0]]), "to": float(found.rpm[part[-1]]), "failed draws": span(lost[part])}
-        row |= {"verdict": verdict, "chance": span(100 * known, " %") if known.size else None}
-        rows.append(row | {"95 % bars": span(100 * np.concatenate([low[part], high[part]]), " %")})
+        row |= {"verdict": state, "chance": span(known, " %") if known.size else None}
+        rows.append(row | {"95 % bars": span(shares[part, 1:], " %")})
     columns = [column for end in ("from", "to") for column in speed_columns(end, end, beside)]
     columns += ["verdict", "chance", "95 % bars", *(["failed draws"] if np.any(lost) else [])]
     return table(f"Chance of chaos of {name} at each speed alone, {len(found.place)} draws [rpm]", rows, columns)
@@ -48,7 +40,7 @@ def chances_notes(found: Ensemble) -> list[str]:
     notes = [f"{len(found.place)} draws from {len(found.unknowns)} ranges, one initial state each, {length}"]
     if np.any(found.failed):
         lost = f"{int(np.sum(found.failed))} of {found.failed.size} simulations failed and are in no chance"
-        notes.append(f"{lost}; bars and the verdicts calm and chaotic hold whatever they would do.")
+        notes.append(f"{lost}; bars and the verdicts calm and rattles hold whatever they would do.")
     return notes
 
 

@@ -33,7 +33,7 @@ SURE = 0.05
 def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None) -> Axes:
     """Bar chart of the elasticities of edges, or of widths, by the parameters that move any of them most.
 
-    Guidance gap and eccentricity are on top; the others follow by their largest elasticity. Untrusted bars are hatched.
+    Guidance gap and eccentricity are on top; the others follow by their largest elasticity.
 
     **Arguments:** sensitivities, one colour each; axes.
 
@@ -44,23 +44,15 @@ def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None
     names, count = _largest_first(sensitivities), len(sensitivities)
     ax = style.axes_or_new(ax, 9.0, 1.2 + len(names) * (0.1 + 0.125 * count))
     thick, place = 0.8 / count, np.arange(len(names))
-    row = ax.get_window_extent().height * 72 / ax.figure.dpi / len(names)
-    size = float(np.clip(1.05 * row * thick, 4.5, 7.5))
-    for i, s in enumerate(sensitivities):
+    for i, (s, colour) in enumerate(zip(sensitivities, cycle(EDGE_COLOURS), strict=False)):
         value = np.array([s.elasticity.get(name, np.nan) for name in names])
-        note, alpha, hatch = ("", 1.0, None) if s.trusted else (", not trusted", 0.45, "///")
-        look = {"color": EDGE_COLOURS[i % len(EDGE_COLOURS)], "alpha": alpha, "hatch": hatch}
-        label = f"{s.name} ({s.value_rpm:.0f} rpm{note})"
         at = place + (i - (count - 1) / 2) * thick
-        bars = ax.barh(at, value, height=0.9 * thick, **look, edgecolor="white", linewidth=0, label=label)
-        ax.bar_label(bars, fmt="{:+.2g}", padding=3, fontsize=size, color=BLACK)
-    for k in range(0, len(names), 2):
-        ax.axhspan(k - 0.5, k + 0.5, color=style.BAND, linewidth=0, zorder=0)
+        label = f"{s.name} ({s.value_rpm:.0f} rpm{'' if s.trusted else ', not trusted'})"
+        bars = ax.barh(at, value, height=0.9 * thick, color=colour, linewidth=0, label=label)
+        ax.bar_label(bars, fmt="{:+.2g}", padding=3, fontsize=6, color=BLACK)
     _named_rows(ax, [readable(name) for name in names])
-    values = np.array([s.elasticity.get(n, 0.0) for s in sensitivities for n in names] + [0.0])
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    margin = 0.12 * (high - low) or 1.0
-    ax.set_xlim(low - margin if low < 0 else -0.2 * margin, high + margin if high > 0 else 0.2 * margin)
+    ax.use_sticky_edges = False  # bars would begin at the frame
+    ax.margins(x=0.12)
     ax.set_xlabel("Elasticity: relative change of the speed over relative change of the parameter")
     style.legend_above(ax, ncols=min(count, 2))
     return ax
@@ -92,9 +84,8 @@ def statistic_bars(found: "MeanGradient", title: str = "") -> Figure:
 
     def bars(ax: Axes, each: Any, colour: str) -> None:
         _bars_with_errors(ax, names, each.elasticity, each.elasticity_error, [colour] * len(names))
-        drifts = "" if each.settled else ", not settled"
         head = f"{readable(head_of(each.name, each.unit))}: {each.value:.3g}{f' {each.unit}' * (each.unit != '1')}"
-        ax.set_title(f"{head}{drifts}", fontsize=9, loc="left")
+        ax.set_title(f"{head}{'' if each.settled else ', not settled'}", fontsize=9, loc="left")
         ax.set_xlabel("Elasticity, with two standard errors", fontsize=9)
 
     draw = [partial(bars, each=each, colour=colour) for each, colour in zip(shown, cycle(EDGE_COLOURS), strict=False)]
@@ -132,7 +123,7 @@ def optimum_figure(found: "Optimum", rows: Sequence["BeforeAfter"], title: str =
 def chance_of_chaos(found: "Ensemble", ax: Axes | None = None) -> Axes:
     """Diagram of the chance of chaos at each speed alone, with 95 % bars."""
     ax = style.axes_or_new(ax, 9.0, 4.2)
-    rpm, chance, (low, high) = found.rpm, found.chance, found.interval
+    rpm, (chance, low, high) = found.rpm, found.chance_of_chaos.T
     groups = {
         "at most 5 % of the draws are chaotic": (chance <= SURE, BLUE),
         "more": ((chance > SURE) & (chance < 1 - SURE), PURPLE),

@@ -144,13 +144,12 @@ def mean_gradient_tables(title: str, found: MeanGradient) -> list[Table]:
         for direction in by:
             if "+" not in direction:
                 by[direction] |= dict(zip(("slope", "slope_error"), found.slope(name, direction), strict=True))
-        names = "unit value value_error drift drift_error settled explained"
-        rows.append({"name": name, **chosen(each, names), "by": by})
+        rows.append({"name": name, **chosen(each, "unit value value_error drift drift_error settled"), "by": by})
         order = sorted(by, key=lambda n: -abs(by[n]["elasticity"])) if each.value else []
         moved += [{"statistic": name, "by": n.replace("_", " ").replace("+", ", ")} | by[n] for n in order]
     elasticities = ["statistic", "by", Column("elasticity", error="error")]
     means = [Column("statistic", "name"), Column("mean", "value", error="value_error"), Column("SI unit", "unit")]
-    means += [Column("explained", shown="%", digits=0), "settled"]
+    means.append(Column("settled"))
     return [
         table(f"Elasticities, {title}", moved, elasticities),
         table(f"Means, {title}", rows, means, "statistics"),

@@ -10,7 +10,7 @@ import xarray as xr
 from .._parameters import parameter_info
 from ..analysis import ONE_ROLLER
 from ..bearing import listed_like, static_load_rating
-from ..design import Checked, Index, Margins, RangeChance
+from ..design import Chance, Checked, Index, Margins
 from .tables import OWN, UNIT, Beside, Column, Table, speed_columns, table
 
 
@@ -20,26 +20,25 @@ FAR = 0.3
 """Relative change of a parameter beyond which a first derivative is not extrapolated."""
 
 
-def range_sentence(over: str, chance: RangeChance | None, checked: Checked | None) -> str:
+def range_sentence(over: str, found: Chance | Checked) -> str:
     """Sentence of the verdict, from draws of the unknowns or from simulations of a known design."""
-    if chance is not None:
-        low, high = chance.interval
-        share = f"{100 * chance.share:.0f} %" if chance.known else "unknown"
-        words = {"calm": "Calm", "rattles": "The cage rattles", "not decided": "Not decided"}[chance.state]
+    if isinstance(found, Chance):
+        low, high = found.interval
+        share = f"{100 * found.share:.0f} %" if found.known else "unknown"
+        words = {"calm": "Calm", "rattles": "The cage rattles", "not decided": "Not decided"}[found.state]
         bars = f"95 % interval {100 * low:.0f} to {100 * high:.0f} %"
         return f"{words}: over {over} the cage is calm with probability {share} ({bars})."
-    assert checked is not None
-    if checked.calm:
-        return f"Calm: over {over} all {checked.initial_states} initial states end on the calm motion at every speed."
-    share, lost = (100 * checked.shares.get(label, 0.0) for label in ("periodic-1", "failed"))
+    if found.calm:
+        return f"Calm: over {over} all {found.initial_states} initial states end on the calm motion at every speed."
+    share, lost = (100 * found.shares.get(label, 0.0) for label in ("periodic-1", "failed"))
     failures = f", and {lost:.1f} % failed" if lost else ""
-    if checked.state == "not decided":
+    if found.state == "not decided":
         return f"Not decided: over {over} {share:.1f} % of the simulations end calm{failures}."
-    everywhere = checked.chaotic_rpm.size == checked.speeds_rpm.size
+    everywhere = found.chaotic_rpm.size == found.speeds_rpm.size
     if share == 0 and everywhere:
         return f"The cage rattles: over {over} no simulation ends on a calm motion{failures}."
     where = "at every speed" if everywhere else "at some speeds"
-    where = f"and chaos is seen {where}" if checked.chaotic_rpm.size else "the others on other motions"
+    where = f"and chaos is seen {where}" if found.chaotic_rpm.size else "the others on other motions"
     return f"Not calm from every initial state: over {over} {share:.1f} % end calm, {where}{failures}."
 
 
@@ -112,11 +111,9 @@ def forces_note(found: Mapping[str, Mapping[str, float]], unknown: Sequence[str]
 
 
 def indices_table(rows: Sequence[Index]) -> Table:
-    """Table of the values whose measurement would decide most, with the chance of rattling at the ends of their
-    ranges."""
-    shown = [{**r._asdict(), "low": r.quarters[0], "high": r.quarters[1]} for r in rows if r.telling]
+    """Table of the values whose measurement would decide most."""
+    shown = [row._asdict() for row in rows if row.telling]
     columns = [Column("value", "label"), Column("of the verdict", "share", shown="%", error="error", digits=0)]
-    columns += [Column(f"rattles in its {end} quarter", end, shown="%", digits=0) for end in ("low", "high")]
     title = "What would decide it: first-order indices of the unknown values"
     return table(title, shown[:MOST], columns, "indices")
 
@@ -197,11 +194,9 @@ SKIDS = 0.02
 def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float, slip: float | None = None) -> list[str]:
     """Notes that compare the load of a bearing [N] with the makers' rules, and these with a computed slip."""
     like, rating = listed_like(bearing), static_load_rating(bearing)
-    rules = [
-        ("C0/60, with C0 by ISO 76" if like is None else f"C0/60 of {like.designation}", like and like.static_rating)
-    ]
-    rules = [(words, (value or rating) / 60) for words, value in rules]
+    rules = [("C0/60, with C0 by ISO 76", rating / 60)]
     if like is not None:
+        rules = [(f"C0/60 of {like.designation}", (like.static_rating or rating) / 60)]
         usual, brass = like.minimum_loads(shaft_rpm)
         rules += [("SKF's rule, usual cage", usual), ("SKF's rule, one-piece brass cage", brass)]
     rules = [(words, value) for words, value in rules if math.isfinite(value)]
