@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 import jaxcage as jc
 from jaxcage.cli import main
+from jaxcage.cli.progress import progress, report
 
 
 LENGTH = {"discard": 1, "revolutions": 2, "blocks": 2}
@@ -117,3 +119,15 @@ def test_unfinished_speeds_are_those_of_one_bearing(tmp_path: Path, monkeypatch:
         path.write_text(f'model = "bearing"\nbase = "nu2310"\n[drag]\ndrag_law = "{law}"\n')
         main(["sweep", str(path), "--out", str(tmp_path)])
     assert kept[0] == kept[2] != kept[1]
+
+
+def test_the_time_is_estimated_if_it_is_long(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    for seconds, said in ((5.0, ["sweep 1a, lanes: 1 of 100, 8.2 min left"]), (0.4, [])):
+        with progress("sweep 1a"):
+            for done in range(5):
+                now[0] += seconds
+                report("lanes", done, 100)
+        lines = capsys.readouterr().err.splitlines()
+        assert lines[:1] == said

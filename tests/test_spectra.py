@@ -33,8 +33,8 @@ def test_dominant_order_is_interpolated_between_bins(order):
 
 
 def test_dominant_orders_are_ranked_and_the_mean_left_out():
-    lines = ((1, 1.0), (0.5, 2.0), (3, 0.3), (7, 1e-3))
-    found = spectrum(lambda t: 9.0 + sum(a * np.sin(k * t) for k, a in lines))
+    added = ((1, 1.0), (0.5, 2.0), (3, 0.3), (7, 1e-3))
+    found = spectrum(lambda t: 9.0 + sum(a * np.sin(k * t) for k, a in added))
     lines = dominant_orders(found)
     np.testing.assert_allclose([p.order for p in lines], [0.5, 1, 3], atol=1e-6)
     np.testing.assert_allclose([p.amplitude for p in lines], [2, 1, 0.3], rtol=1e-6)

@@ -15,6 +15,7 @@ from .._errors import Stop
 
 
 SECONDS_BETWEEN_LINES = 10.0
+SECONDS_TO_ESTIMATE = 3.0
 ENDS = (signal.SIGINT, signal.SIGTERM)
 """Signals by which a command is told to end."""
 LISTENS = 5.0
@@ -137,20 +138,21 @@ def progress(text: str) -> Iterator[None]:
 
 def _timed(text: str, bar: Report | None) -> Report:
     """Report that moves the bar or, without one, prints lines with what is done and the time that the rest takes, from
-    the rate since the stage began."""
-    stage, first, began, said = "", 0, math.nan, time.monotonic()
+    the rate since the stage began. The first line of a stage of more than a minute comes early."""
+    stage, first, began, said, told = "", 0, math.nan, time.monotonic(), False
 
     def report(what: str, done: int, total: int) -> None:
-        nonlocal stage, first, began, said
+        nonlocal stage, first, began, said, told
         now = time.monotonic()
         if what != stage:
-            stage, first, began = what, done, now
+            stage, first, began, told = what, done, now, False
+        left = (total - done) * (now - began) / (done - first) / 60 if done > first else math.nan
+        early = not told and left > 1 and now - began >= SECONDS_TO_ESTIMATE
         if bar is not None:
             bar(what, done, total)
-        elif now - said >= SECONDS_BETWEEN_LINES:
-            said = now
-            left = f", {(total - done) * (now - began) / (done - first) / 60:.1f} min left" if done > first else ""
-            say(f"{text}, {what}: {done} of {total}{left}")
+        elif early or now - said >= SECONDS_BETWEEN_LINES:
+            said, told = now, True
+            say(f"{text}, {what}: {done} of {total}{'' if math.isnan(left) else f', {left:.1f} min left'}")
 
     return report
 

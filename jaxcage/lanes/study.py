@@ -150,7 +150,7 @@ def label_map(
     - `stage`: function called as lanes finish.
     - `settings`: fields of `jaxcage.lanes.Run`; lanes are neither confirmed nor followed to a horizon.
 
-    **Returns:** a data set over both and `initial_state`.
+    **Returns:** a data set over both and `initial_state`, with the variables of `sweep`.
 
     **Raises:** `ValueError` for arguments that do not fit together; `RuntimeError` without double precision.
     """

@@ -218,7 +218,7 @@ DEFAULT_STEPS = 1024
 
 
 def method(solver: str | None = None, steps: int | None = None, tolerance: float | None = None) -> AbstractMethod:
-    """Integration method by name, with equal or adaptive steps.
+    """Make an integration method by name, with equal or adaptive steps.
 
     **Arguments:**
 
@@ -293,10 +293,13 @@ class StrobeMap(eqx.Module):
 
 
 def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod | None = None) -> StrobeMap:
-    """Strobe map of `system` at `speed` [rad/s].
+    """Build the strobe map of a system.
 
-    **Arguments:** system; speed; integration method, by default the classical Runge-Kutta method with 1024 steps,
-    shortened near abrupt changes of the law.
+    **Arguments:** system; speed [rad/s]; integration method, by default the classical Runge-Kutta method with 1024
+    steps, shortened near abrupt changes of the law.
+
+    **Returns:** `StrobeMap`: called with a state, a tuple of scalars [SI], it returns a `Stretch` with the state `y`
+    after one revolution. **Raises:** `ValueError` for an impossible speed, `RuntimeError` without double precision.
     """
     require_x64()
     require_speeds(system, speed)
