@@ -75,7 +75,7 @@ REFUSED = [
     ("sensitivity 1a --samples 3", "--samples must be a power of 2"),
     ("identify 1a data.csv", "must be a TOML file with ranges"),
     ("report 1a --operating fast", "--operating must be a range of speed"),
-    ("check 1a --operating 8500", "--operating must be one range"),
+    ("check 1a --operating 8500", "--operating must be two speeds"),
     ("check 1a --operating 8500-90000", "62516 rpm"),
     ("gradient 1a --speed 1e4", "--speed goes with a bearing"),
     # Whole bearings.

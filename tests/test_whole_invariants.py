@@ -208,7 +208,7 @@ def test_traction_falls_with_the_viscosity():
             cold, warm = float(oil.dynamic_viscosity), float(vg(56.0).dynamic_viscosity)
             expected = roelands(cold, pressure) / film(cold) / (roelands(warm, pressure) / film(warm))
             assert slope(cold / warm) / slope(1.0) == pytest.approx(expected, rel=0.1), (pressure, celsius)
-        assert slope(1.0) == float(jax.grad(lambda u: Traction().curve(u))(0.0))
+        assert slope(1.0) == float(jax.grad(lambda u: Traction().at()(u))(0.0))
 
 
 def test_energy_of_a_contact_is_the_work_of_its_force():
