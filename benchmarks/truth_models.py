@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 import jaxcage as jc
-from jaxcage._kinematics import FASTEST
+from jaxcage._bearing_data import FASTEST
 from jaxcage.models import CageModel
 from jaxcage.solve import AbstractMethod, native
 from tests import reference

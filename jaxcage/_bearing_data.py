@@ -1,11 +1,20 @@
-"""Bearings of `bearing/catalogue.csv` and materials of `bearing/cage_materials.csv` by name: nothing here loads JAX."""
+"""Bearings of `bearing/catalogue.csv` and materials of `bearing/cage_materials.csv` by name, and speeds of a cage.
+
+Files are checked with these before JAX is loaded.
+"""
 
 import csv
 import functools
 import importlib.resources
-from typing import NamedTuple
+import math
+from typing import Any, NamedTuple
 
-from ._errors import ArgumentError
+from ._errors import ArgumentError, InputError
+
+
+FASTEST = 300.0
+"""Surface speed of the cage at its land [m/s] beyond which no cage runs: rho v^2 alone is 765 MPa of hoop stress in
+brass, twice what it bears, and what is given in rpm for rad/s is 9.5 times as fast as meant."""
 
 
 @functools.cache
@@ -87,3 +96,27 @@ def cage_material(name: str) -> CageMaterial:
         if name.upper() in (known.upper(), known.partition("-")[0].upper()):
             return material
     raise ArgumentError("name", said=f"must be one of {', '.join(cage_materials())}, but {name!r} was given.")
+
+
+def cage_speed_ratio(inner_raceway_diameter: Any, roller_diameter: Any) -> Any:
+    """Cage speed over shaft speed, from (8): (1 - d_w/d_m)/2 with d_m = d_i + d_w [1]."""
+    return (1 - roller_diameter / (inner_raceway_diameter + roller_diameter)) / 2
+
+
+def land_radius(rib_diameter: Any, guidance_gap: Any) -> Any:
+    """Radius of the guiding surface of a cage within the outer ring's ribs, (d_g - C_r)/2 [m]."""
+    return (rib_diameter - guidance_gap) / 2
+
+
+def require_cage_rpm(option: str, cage: float, radius: float) -> None:
+    """Compare a speed of the cage [rpm] with that at which its land, of a radius [m], runs at `FASTEST`.
+
+    **Raises:** `InputError` about the option.
+    """
+    limit = FASTEST / radius * 30 / math.pi
+    if not 0 < cage <= limit:
+        raise InputError(
+            f"Option {option} must be above 0 and leave the cage at most {limit:.0f} rpm, which is {FASTEST:g} m/s at "
+            f"its land, but {cage:g} rpm of the cage were given; speeds of the shaft are written "
+            '"20000 rpm shaft".'
+        )

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Array
 
 from .._arguments import is_concrete
+from .._bearing_data import cage_speed_ratio
 from .._errors import ArgumentError
-from .._kinematics import cage_speed_ratio
 from .._parameters import count, parameter
 from .._pytrees import Scalar
 from .line_contact import PALMGREN_CONSTANT, line_contact_stiffness

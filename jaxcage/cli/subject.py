@@ -10,8 +10,8 @@ import numpy as np
 
 import jaxcage as jc
 
+from .._bearing_data import cage_speed_ratio, land_radius, require_cage_rpm
 from .._errors import InputError
-from .._kinematics import cage_speed_ratio, land_radius, require_cage_rpm
 from .options import Range, flag
 from .progress import say
 

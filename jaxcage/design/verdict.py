@@ -1,4 +1,4 @@
-"""How far a design is from a loss of stability, what would change that, and where its simulations end.
+"""Distance of a design from a loss of stability, what would change it, and where its simulations end.
 
 The best guess of a design has a stable range of speed with exact edges: the distance of an operating range from them is
 its margin, with exact derivatives. A stable orbit need not attract every initial state, so that the design is also

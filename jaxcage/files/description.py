@@ -16,9 +16,8 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from .._allowed import ParameterInfo, allowed as must_be, must_be_given, within
-from .._bearing_data import CageMaterial, cage_material, designated, estimated
+from .._bearing_data import CageMaterial, cage_material, cage_speed_ratio, designated, estimated
 from .._errors import ConfigError
-from .._kinematics import cage_speed_ratio
 from .disk import read_bytes
 from .plausibility import check_numbers
 from .ranges import Range, is_range, read_range

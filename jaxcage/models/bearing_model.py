@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._arguments import is_concrete, require_at_least, require_x64
+from .._bearing_data import land_radius
 from .._errors import ArgumentError
-from .._kinematics import land_radius
 from .._parameters import choice, parameter
 from .._pytrees import Scalar, compiled
 from ..bearing import (

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Array
 
 from .._arguments import is_concrete
+from .._bearing_data import land_radius
 from .._errors import ArgumentError
-from .._kinematics import land_radius
 from .._parameters import parameter, reading, require_readings, with_numbers
 from .._pytrees import Scalar, State
 from ..bearing import Bearing, Lubricant

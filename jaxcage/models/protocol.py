@@ -15,8 +15,8 @@ import jax
 import numpy as np
 
 from .._arguments import is_concrete
+from .._bearing_data import FASTEST
 from .._errors import ArgumentError, InputError
-from .._kinematics import FASTEST
 from .._pytrees import Scalar, State
 from ..quantities import Quantity
 from .field import AbstractField
