@@ -286,7 +286,7 @@ REFUSED = [
     (dict(search="newton"), "`search` must be one of slsqp, augmented, but 'newton' was given"),
     (dict(objective="noise"), "`objective` must be one of cost, width, but 'noise' was given"),
     (dict(cost={"z": Price(1.0, 1.0)}), "`cost` must name parameters of the design, but has 'z'"),
-    (dict(tolerance={"x": Tolerance.balanced(2.5, 100.0)}), "`tolerance` gives the made range of x itself"),
+    (dict(tolerance={"x": Tolerance.balanced(2.5, 100.0)}), "`tolerance` of x is its whole range"),
     (dict(tolerance={"x": Tolerance(0.1, -0.1)}), "`tolerance` of x must have a lower end below its upper end"),
     (dict(operating=(2.7, 3.0)), "must have a stable orbit somewhere in its operating range, 26 to 29 rpm"),
 ]

@@ -209,3 +209,18 @@ def test_help_version_and_errors_of_typing_load_no_jax(arguments: str, status: i
     assert lines[-1] == f"{status} []"
     if arguments == "--version":
         assert lines[0] == f"jaxcage {jaxcage.__version__}"
+
+
+def test_a_balance_grade_replaces_the_usual_bounds_of_the_eccentricity(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    def design_for(model, operating, vary, *args, **more):
+        raise OSError(f"varied: {', '.join(vary)}")
+
+    monkeypatch.setattr(jaxcage, "design_for", design_for)
+    for given, varied in (
+        ("guidance_gap=+-0.02 mm", "guidance_gap, eccentricity"),
+        ("eccentricity=G6.3", "guidance_gap"),
+    ):
+        assert main(["design", "1a", "--operating", "12600-17600", "--tolerance", given]) == 1
+        assert capsys.readouterr().err.splitlines()[-1] == f"varied: {varied}"

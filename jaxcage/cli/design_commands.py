@@ -70,7 +70,7 @@ def design(
             raise InputError(f"Option --search {search} goes with --operating.")
         if price or steps is not None:
             raise InputError("Options --price and --steps go with a search on simulations, without --operating.")
-        return _calm_design(subject, bounds, calm, notes, search=search, seed=seed)
+        return _calm_design(subject, bounds, calm, notes, usual=not vary, search=search, seed=seed)
     if calm.operating is not None:
         raise InputError("Option --search surrogate goes without --operating, over --first to --last.")
     prices = read_prices(price, subject.usual({"cost": 1e3}, dict.fromkeys(d.TERMS, 1.0)))
@@ -119,14 +119,17 @@ def _runs(subject: Subject, over: o.Range, means: o.MeanOptions, seed: int = 0, 
 
 
 def _calm_design(
-    subject: Subject, bounds: dict[str, Any], calm: o.CalmOptions, notes: list[str], **searches: Any
+    subject: Subject, bounds: dict[str, Any], calm: o.CalmOptions, notes: list[str], usual: bool, **searches: Any
 ) -> Answer:
-    """Answer on the design of a cage for calm operation over a range of speed."""
+    """Answer on the design of a cage for calm operation over a range of speed; of the usual bounds those are left out
+    that a balance grade replaces."""
     model, name = subject.model, subject.name
     subject, (low, high) = subject.operating(calm.operating)
     film = None if calm.least_film is None else jc.files.to_si(calm.least_film, "m")
     keep = jc.Requirements(calm.margin, calm.decay, film, calm.land_force, calm.grade, calm.drag)
     tolerance = read_tolerances(calm.tolerance or "", subject, high)
+    graded = {n for n, each in tolerance.items() if each.absolute} if usual else set()
+    bounds = {n: ends for n, ends in bounds.items() if n not in graded}
     given: dict[str, Any] = {"objective": calm.objective, "tolerance": tolerance}
     best = jc.design_for(model, (low, high), bounds, keep, **given, **searches, progress=report)
     tables = [jc.show.changed_table(f"Design of {name}", model, best, bounds)]

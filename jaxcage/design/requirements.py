@@ -171,7 +171,7 @@ def widened(model: Any, vary: Bounds, tolerance: Mapping[str, Tolerance]) -> dic
         if not each.lower < each.upper:
             raise ArgumentError("tolerance", said=f"of {name} must have a lower end below its upper end.")
         if each.absolute and name in vary:
-            raise ArgumentError("tolerance", said=f"gives the made range of {name} itself: it cannot be varied too.")
+            raise ArgumentError("tolerance", said=f"of {name} is its whole range: {name} cannot be varied too.")
         if name not in vary:
             low, *_, high = sorted([*each.ends(known[name]), known[name]])
             bounds[name] = low - 0.5 * (high - low), high + 0.5 * (high - low)
