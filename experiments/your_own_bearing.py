@@ -129,6 +129,5 @@ print(f"Calm over the whole range: {chance.share:.0%} of {chance.known} draws (9
 
 # %% [markdown]
 # ## Conclusion
-# The best guess is calm at all speeds of the machine, and so are 98 % of the draws, with a 95 % interval of 93 to
-# 100 %: the cage very probably stays calm. Above 9500 rpm of the cage, 21 000 rpm of the shaft, the ranges are too
-# wide to decide.
+# The best guess is calm at all speeds of the machine, and so are all 128 draws, with a 95 % interval of 97 to 100 %:
+# the cage very probably stays calm. Up to twice the highest speed at most one draw in 128 is chaotic at any speed.
