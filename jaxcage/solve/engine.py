@@ -25,9 +25,10 @@ from .fields import SAMPLED, numbers_at, shape_of_numbers, traced_field
 from .ir import UnknownOperation, say_once
 from .layout import REVOLUTION, Tableau, layout_of
 from .loop import march_ir
-from .method import IMPLICIT, AbstractMethod, NativeSteps, StrobeMap
+from .method import IMPLICIT, AbstractMethod, NativeSteps
 from .object_code import function
 from .outcomes import FINISHED, March
+from .strobe_map import StrobeMap
 
 
 WIDTH = 8
