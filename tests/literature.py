@@ -401,8 +401,8 @@ def page(found: dict[str, list[Row]]) -> str:
         f"# Validation\n\n{sum(r.passed for r in rows)} of {len(rows)} comparisons pass: {len(rows) - reynolds} "
         f"numbers of jaxcage, and {reynolds} of the solver of\nReynolds' equation in `tests/reynolds.py`, with which "
         "the tests compare the short film of the package: the rows of long\n"
-        "and concentric films, of full bearings and of grooves. "
-        f"Made with jaxcage {jc.__version__} by `python tests/literature.py`.\n",
+        "and concentric films, of full bearings and of grooves.\n"
+        f"The numbers were made with jaxcage {jc.__version__} by `python tests/literature.py`.\n",
         "A tolerance is what the source supports: half a unit of the last printed digit where ours is exact, more",
         "where theirs was computed on a coarse grid or ours is a finite sample. FAILS marks a difference beyond it.",
         "A source is one that can be opened, or a second computation that shares no code with what it is held against.",
