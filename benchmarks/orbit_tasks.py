@@ -34,8 +34,8 @@ class Task:
     numbers: Callable[["Task"], str]
     """Contents of the header that the equations include."""
     guess: tuple[float, ...] | None = None
-    published: tuple[float, ...] = ()
-    """Special points that others have printed [unit]."""
+    known: tuple[float, ...] = ()
+    """Special points that the tests' table of literature has from another solver [unit]."""
 
     @property
     def dimension(self) -> int:
@@ -64,7 +64,7 @@ def _duffing(damping: float, linear: float, force: float) -> jc.ForcedOscillator
 
 
 def duffing(
-    begin: float, end: float, numbers: Sequence[float], guess: tuple[float, ...], published: tuple[float, ...]
+    begin: float, end: float, numbers: Sequence[float], guess: tuple[float, ...], known: tuple[float, ...]
 ) -> Task:
     """x'' + damping x' + linear x + x^3 = force cos(w t) over w."""
     damping, linear, force = numbers
@@ -73,7 +73,7 @@ def duffing(
     )
     name = f"Duffing {damping:g}, {linear:g}, {force:.9g}"
     make = functools.partial(_duffing, *numbers)
-    return Task(name, "duffing_law.c", "rad/s", begin, end, 1.0, make, lambda task: header, guess, published)
+    return Task(name, "duffing_law.c", "rad/s", begin, end, 1.0, make, lambda task: header, guess, known)
 
 
 def cage_numbers(task: Task) -> str:

@@ -173,7 +173,7 @@ def line(task: Task, row: Row, truth: Row) -> list[str]:
 
 
 def verdict(task: Task, ours: Row, autos: list[Row]) -> str:
-    """Ours against AUTO's first mesh, and published points, in a line."""
+    """Ours against AUTO's first mesh, and known points, in a line."""
     said = [f"{task.name} [{task.unit}]:"]
     if not autos[0].absent:
         said += [
@@ -181,9 +181,9 @@ def verdict(task: Task, ours: Row, autos: list[Row]) -> str:
             f"in {ours.warm / autos[0].process:.1f} of its time warm",
             f"and {ours.process / autos[0].process:.1f} in a new process.",
         ]
-    for place in task.published:
+    for place in task.known:
         nearby = min((abs(at - place), error) for (_, at), error in zip(ours.special, ours.errors, strict=True))
-        said.append(f"Published {place:.9g}: off by {nearby[0]:.1e}, error bar {nearby[1]:.1e}.")
+        said.append(f"Validation has {place:.9g}: off by {nearby[0]:.1e}, error bar {nearby[1]:.1e}.")
     return " ".join(said)
 
 

@@ -53,7 +53,7 @@ def test_auto_finds_a_published_doubling(tmp_path: pathlib.Path):
     found, _ = auto.run(tmp_path, orbit, DOUBLING.end / DOUBLING.begin, 50)
     ((kind, ratio),) = found["special"]
     assert kind == "period-doubling"
-    assert ratio * DOUBLING.begin == pytest.approx(DOUBLING.published[0], abs=1e-8)
+    assert ratio * DOUBLING.begin == pytest.approx(DOUBLING.known[0], abs=1e-8)
 
 
 DIAGRAM = """
