@@ -81,7 +81,7 @@ def test_failures_are_no_knowledge():
     assert note == "The largest force on the cage at 990 rpm is not known: the simulation there failed"
     found = ensemble(np.zeros((64, 2), bool), np.ones((64, 2), bool))
     chance, *outcomes = range_chance(found, 900, 2100)
-    assert chance.known == 0 and indices_note(indices(found, *outcomes)).startswith("The finished draws agree, or are")
+    assert chance.known == 0 and indices_note(indices(found, *outcomes)).startswith("No unknown value stands out")
     few = ensemble(np.array([[True, True], [False, False], [False, False]]))
     assert indices(few, *range_chance(few, 900, 2100)[1:]) == []
 

@@ -47,7 +47,7 @@ def text(
             raise ValueError(f"must {must}, but '{given[0]}' was given.")
         return read(given[0])
 
-    shown = lambda x: "by the model" if x is None else f"{x:g}" if isinstance(x, float) else str(x)
+    shown = lambda x: "unset" if x is None else f"{x:g}" if isinstance(x, float) else str(x)
     return PrimitiveConstructorSpec(
         nargs=1,
         metavar=metavar,
@@ -190,7 +190,7 @@ class StepOptions:
 
 @dataclasses.dataclass(frozen=True)
 class RunOptions(StepOptions):
-    """Options of the length of a run."""
+    """Options of the length of a run; the model has values for those that are unset."""
 
     discard: OptionalZero = None
     """Revolutions discarded at the beginning."""
@@ -206,7 +206,7 @@ class RunOptions(StepOptions):
 
 @dataclasses.dataclass(frozen=True)
 class SweepOptions(RunOptions):
-    """Options of the length of a sweep and of the certainty of its labels."""
+    """Options of the length of a sweep and the certainty of its labels; the model has values for those that are unset."""
 
     horizon: OptionalZero = None
     """Revolutions up to which chaotic trajectories are continued, to see how long chaos lasts; 0 turns this off."""

@@ -121,7 +121,7 @@ def indices_table(rows: Sequence[Index]) -> Table:
 def indices_note(rows: Sequence[Index]) -> str:
     """Note on the value to measure first, if the draws show it."""
     if not rows:
-        return "The finished draws agree, or are too few to tell which unknown value changes the verdict."
+        return "No unknown value stands out: all finished draws end alike, or are too few to compare."
     if not rows[0].telling:
         return "The draws do not tell which unknown value to measure first (no index exceeds twice its error)."
     return f"Measure {rows[0].label} first: {rows[0].source}"
