@@ -206,7 +206,7 @@ class RunOptions(StepOptions):
 
 @dataclasses.dataclass(frozen=True)
 class SweepOptions(RunOptions):
-    """Options of the length of a sweep and the certainty of its labels; the model has values for those that are unset."""
+    """Options of a sweep and the certainty of its labels; the model has values for those that are unset."""
 
     horizon: OptionalZero = None
     """Revolutions up to which chaotic trajectories are continued, to see how long chaos lasts; 0 turns this off."""
