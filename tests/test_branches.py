@@ -276,13 +276,17 @@ def test_crossing_that_is_not_found_is_said_to_be_unexplained():
         (dict(lower=0.0, upper=1.0), "`lower` must be positive where the speed is followed, but 0 was given"),
         (dict(lower=0.5, upper=np.inf), "`lower` and `upper` must be finite, but are 0.5 and inf"),
         (dict(lower=1.0, upper=2.0), "`orbit` must begin from 1 to 2, `lower` and `upper`, but is at 0.8"),
+        (
+            dict(orbit=((0.5,), 0.8), lower=0.5, upper=1.0),
+            r"`orbit` must be a state of 2 numbers, but has shape \(1,\)",
+        ),
         (dict(parameter="a", lower=0.0, upper=1.0), "`parameter` must be one of speed, m, d, k, b, g, but 'a' was"),
         (dict(parameter="g", lower=0.1, upper=1.0, speed=None), "`speed` must be given where the parameter is"),
     ],
 )
 def test_bad_arguments(settings, sentence):
     with pytest.raises(ValueError, match=sentence):
-        jc.branch(hardening(), ((0.5, 0.0), 0.8), **(dict(method=METHOD, speed=0.8) | settings))
+        jc.branch(hardening(), **(dict(orbit=((0.5, 0.0), 0.8), method=METHOD, speed=0.8) | settings))
 
 
 def test_an_orbit_at_the_end_of_the_range_is_followed_and_other_starts_are_refused():

@@ -270,5 +270,5 @@ def read_start(
     if speed is None:
         raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
     require_speeds(system, speed)
-    state = guess_state(system, speed, state)
+    state = guess_state(system, speed, state, name)
     return Start(state, jnp.asarray(speed, dtype=float), frozen(jnp.asarray(at, dtype=float)))
