@@ -32,6 +32,13 @@ def over_speed():
     return jc.branch(hardening(), orbit, lower=0.5, upper=2.5, method=METHOD)
 
 
+def test_speed_and_periods_given_beside_an_orbit_count():
+    orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), revolutions=200, method=METHOD)
+    settings = dict(lower=0.25, upper=0.35, steps=jc.orbits.StepControl(most=2), method=METHOD)
+    found = jc.branch(hardening(), orbit, "g", speed=0.9, periods=2, **settings)
+    assert set(found.speed.tolist()) == {0.9} and found.periods == 2
+
+
 @pytest.fixture(scope="module")
 def over_force():
     orbit = jc.periodic_orbit(double_well(), 1.2, guess=(1.0, 0.0), revolutions=100, method=FINE)
