@@ -32,6 +32,13 @@ def over_speed():
     return jc.branch(hardening(), orbit, lower=0.5, upper=2.5, method=METHOD)
 
 
+def test_speed_and_periods_given_beside_an_orbit_count():
+    orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), revolutions=200, method=METHOD)
+    settings = dict(lower=0.25, upper=0.35, steps=jc.orbits.StepControl(most=2), method=METHOD)
+    found = jc.branch(hardening(), orbit, "g", speed=0.9, periods=2, **settings)
+    assert set(found.speed.tolist()) == {0.9} and found.periods == 2
+
+
 @pytest.fixture(scope="module")
 def over_force():
     orbit = jc.periodic_orbit(double_well(), 1.2, guess=(1.0, 0.0), revolutions=100, method=FINE)
@@ -276,13 +283,17 @@ def test_crossing_that_is_not_found_is_said_to_be_unexplained():
         (dict(lower=0.0, upper=1.0), "`lower` must be positive where the speed is followed, but 0 was given"),
         (dict(lower=0.5, upper=np.inf), "`lower` and `upper` must be finite, but are 0.5 and inf"),
         (dict(lower=1.0, upper=2.0), "`orbit` must begin from 1 to 2, `lower` and `upper`, but is at 0.8"),
+        (
+            dict(orbit=((0.5,), 0.8), lower=0.5, upper=1.0),
+            r"`orbit` must be a state of 2 numbers, but has shape \(1,\)",
+        ),
         (dict(parameter="a", lower=0.0, upper=1.0), "`parameter` must be one of speed, m, d, k, b, g, but 'a' was"),
         (dict(parameter="g", lower=0.1, upper=1.0, speed=None), "`speed` must be given where the parameter is"),
     ],
 )
 def test_bad_arguments(settings, sentence):
     with pytest.raises(ValueError, match=sentence):
-        jc.branch(hardening(), ((0.5, 0.0), 0.8), **(dict(method=METHOD, speed=0.8) | settings))
+        jc.branch(hardening(), **(dict(orbit=((0.5, 0.0), 0.8), method=METHOD, speed=0.8) | settings))
 
 
 def test_an_orbit_at_the_end_of_the_range_is_followed_and_other_starts_are_refused():

@@ -14,6 +14,7 @@ from shooting import edge_speed, orbit, readings
 
 import jaxcage as jc
 from jaxcage.design import DesignSpace, OperatingRange, Price, Requirements, Tolerance
+from jaxcage.design.requirements import listed
 from jaxcage.forces import parameter
 from jaxcage.orbits import follow, stable_range
 
@@ -182,6 +183,18 @@ def test_gradients_of_requirements(name, where, quantity, step, tolerance, range
     assert found[quantity].slope[i] == pytest.approx(expected, rel=tolerance)
 
 
+def test_contact_is_forbidden_at_the_gap_of_each_design(ranges):
+    """It begins at `onset` times the clearance of that design, which the gap changes."""
+    space, keep = ranges["calm"].space, listed(Requirements(land_force=0.0), CASE)
+    place = space.place + np.array([0.25, 0.0])
+    found = ranges["calm"].worst(place, ("film", "contact"))
+    wider, onset = space.model(place), float(CASE.contact.onset)
+    apart, slope = (x * keep[-1].size for x in keep[-1].slack(found["contact"]))
+    assert apart == pytest.approx(found["film"].value - (1 - onset) * float(wider.clearance), abs=1e-12)
+    by_gap = (1 - onset) * float(wider.clearance / wider.guidance_gap)
+    np.testing.assert_allclose(slope, found["film"].slope - [by_gap * space.span[0], 0.0], rtol=1e-9)
+
+
 # --- designs --------------------------------------------------------------------------------------------------------
 
 
@@ -245,6 +258,20 @@ def test_tolerances_are_met_at_their_worst_corner():
     assert [found.worst[n].value for n in (LOWER, UPPER)] == pytest.approx([10, 10], abs=1e-3)
     assert found.after["upper margin"].value == pytest.approx(12.5, abs=1e-3)
     assert {b.name: (b.width, round(b.factor, 2)) for b in found.budget} == {"x": (0.04, 1.0), "y": (0.06, 1.0)}
+
+
+def test_a_tolerance_to_one_side_may_be_as_wide_as_its_end_allows():
+    """x is at its bound, and x + 0.04 may be up to 1.08."""
+    found = designed(vary=VARY | {"x": (0.7, 1.0)}, tolerance={"x": Tolerance(0.0, 0.04)})
+    (row,) = found.budget
+    assert (row.width, row.limit) == (0.04, LOWER) and row.factor == pytest.approx(2.0, rel=1e-3)
+
+
+def test_a_search_whose_tolerances_allow_no_stable_orbit():
+    """Both edges meet at d = -y^2/4 at the latest: beyond it no orbit is stable."""
+    found = designed(tolerance={"d": Tolerance(-0.7, 0.01)})
+    assert not found.feasible and found.lost == "within the tolerances: no stable orbit in the operating range"
+    assert not found.short and not found.conflict and found.lost in str(found) and f"{LOWER}: unknown" in str(found)
 
 
 def test_requirements_that_exclude_each_other_are_named():

@@ -4,6 +4,8 @@
 with this library. "Planted" systems have orbits and multipliers that are known exactly.
 """
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -45,6 +47,13 @@ def test_folds_of_the_hardening_duffing_pass_a_cusp(fold):
     np.testing.assert_allclose(np.min(np.abs(curve.multipliers - 1), axis=1), 0.0, atol=5e-4)
     product = np.prod(curve.multipliers, axis=1)
     np.testing.assert_allclose(product, np.exp(-0.1 * 2 * np.pi / curve.x_value), rtol=1e-5)
+
+
+@pytest.mark.wide
+def test_curve_by_a_method_with_fewer_steps_than_its_point(fold):
+    point, limits = dataclasses.replace(fold, steps=2048), dict(lower=0.29, upper=0.31, x_lower=1.5, x_upper=3.0)
+    curve = jc.curve(hardening(), point, "speed", "g", **limits, method=METHOD)
+    assert curve.ended == ("range", "range") and set(curve.steps.tolist()) == {256}
 
 
 @pytest.mark.wide

@@ -1,5 +1,7 @@
 """Search, Sobol indices and budgets against closed forms; loads of the land against time histories."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from helpers import WELL, DoubleWell, double_well
 from literature import DUFFING_FOLDS
 
 import jaxcage as jc
+from jaxcage.design.operating import Through
 
 
 VARY = {"damping": (0.1, 1.0), "cubic": (0.5, 3.0)}
@@ -99,6 +102,17 @@ def test_a_parameter_that_changes_nothing_and_scatter_of_the_motion():
     assert still.total["damping"] == 0.0 == still.first["damping"] and still.total_interval["damping"] == (0.0, 0.0)
 
 
+def test_sobol_indices_and_their_intervals_of_a_value_far_from_zero():
+    vary = {"cubic": (0.5, 1.5), "damping": (0.5, 1.5)}
+    plain, shifted = (
+        jc.design.global_sensitivity(double_well(), vary, by_parameters(lambda p: a + p["cubic"] + p["damping"] / 2))
+        for a in (-1.5, 98.5)
+    )
+    assert shifted.first == pytest.approx(plain.first)
+    for name, ends in plain.first_interval.items():
+        assert shifted.first_interval[name] == pytest.approx(ends)
+
+
 def test_tolerance_budget_is_the_root_of_squares():
     elasticity = {"gap": 0.5, "mass": -2.0}
     edge = jc.orbits.Sensitivity("zone 1 exit", "fold", 10000.0, {}, elasticity, {}, 1.0, "converged")
@@ -167,6 +181,21 @@ def test_loads_of_the_land_are_those_of_a_time_history():
         assert got["least film"][lane] == pytest.approx(thinnest, abs=0.01 * float(model.clearance))
         touched += load > 1.0
     assert touched >= 2
+
+
+def test_speeds_without_an_orbit_are_not_the_worst():
+    """Also for the film, whose value for comparison is negative."""
+
+    known = jc.periodic_orbit(double_well(), 1.2, method=jc.method("rk4", steps=64))
+
+    class Known:
+        def orbit(self, speed):
+            return dataclasses.replace(known, speed=speed)
+
+        def size(self, orbit, name):
+            return -np.inf if orbit.speed > 0.6 else -1e-4 * (1 + (orbit.speed - 0.4) ** 2)
+
+    assert Through.largest(Known(), "film", 0.0, 1.0).speed == pytest.approx(0.4, abs=1e-3)
 
 
 @pytest.mark.wide

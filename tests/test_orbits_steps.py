@@ -80,6 +80,11 @@ def test_error_of_a_bifurcation_holds_the_true_value_and_the_gradient_belongs_to
     assert jax.grad(lambda w: find(w).value)(1.2) == pytest.approx(float(fixed), rel=1e-9)
 
 
+def test_error_by_an_odd_number_of_steps_is_also_from_half_as_many():
+    odd, even = (jc.periodic_orbit(stop(), 2.5, method=jc.method("rk4", steps=steps)) for steps in (65, 64))
+    assert odd.steps == 65 and odd.error == pytest.approx(float(even.error), rel=0.2)
+
+
 def test_bifurcation_that_half_the_steps_move_is_not_converged():
     inside, _ = DUFFING_DOUBLINGS[1]
     orbit = jc.periodic_orbit(double_well(inside), 1.2, guess=(1.0, 0.0), revolutions=200)

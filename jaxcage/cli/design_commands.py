@@ -150,8 +150,10 @@ def _calm_design(
 
 
 def _calm_sentence(best: Any, over: str, objective: str) -> str:
+    if best.lost:
+        return f"The values of no design within the bounds are known over {over}: {best.lost}."
     if not best.feasible:
-        short = ", ".join(f"{name} by {value:.3g}" for name, value in best.short.items()) or "an edge is lost"
+        short = ", ".join(f"{name} by {value:.3g}" for name, value in best.short.items())
         against = f" In conflict: {' and '.join(best.conflict)}." if best.conflict else ""
         return f"No design within the bounds keeps all requirements over {over}: short are {short}.{against}"
     if objective == "width":

@@ -49,17 +49,19 @@ FAR = 0.1  # largest change of an orbit from design to design, in units of the s
 BESIDE = 1e-3  # relative distance from an edge within which orbits are ignored
 PEAKING = 0.8  # smaller maxima of the multiplier are ignored
 WORST_AT = 1e-4  # relative accuracy of the speed of a worst value
+NO_ORBIT = 1e30  # a quantity of a speed without an orbit is minus this
 KEPT = 1e-3  # violation up to which a requirement still counts as kept
 RPM = 30 / np.pi
-READ = "land force", "drag", "film"
+READ = "land force", "drag", "film", "contact"
 
 
 # --- orbits through a range -----------------------------------------------------------------------------------------
 
 
-def _readings(system: Any, speed: Array, state: Array, method: AbstractMethod) -> Float[Array, "3"]:
-    """Return the largest land force [N], the mean power lost by shear of the film [W] and minus the least distance of
-    cage and land [m] over a revolution; maxima are interpolated by a parabola."""
+def _readings(system: Any, speed: Array, state: Array, method: AbstractMethod) -> Float[Array, "4"]:
+    """Return the largest land force [N], the mean power lost by shear of the film [W] and minus the least distances of
+    the cage from the land and from the onset of contact [m] over a revolution; maxima are interpolated by a
+    parabola."""
     strobe = strobe_map(system, speed, method)
 
     def part(i: Array, carry: tuple) -> tuple:
@@ -75,7 +77,8 @@ def _readings(system: Any, speed: Array, state: Array, method: AbstractMethod) -
     before, here, after = (peaking[(top + k) % PARTS, jnp.arange(2)] for k in (-1, 0, 1))
     bend = before - 2 * here + after
     highest = here - jnp.where(bend < 0, (after - before) ** 2 / (8 * jnp.where(bend < 0, bend, 1.0)), 0.0)
-    return jnp.stack([highest[0], jnp.mean(seen[:, 1]), highest[1] - system.clearance])
+    distances = highest[1] - jnp.stack([1.0, system.contact.onset]) * system.clearance
+    return jnp.stack([highest[0], jnp.mean(seen[:, 1]), *distances])
 
 
 @compiled
@@ -141,12 +144,12 @@ class Through(NamedTuple):
             return Value(moves.multiplier, moves.multiplier_slope, rpm)
         at = jnp.asarray(self.place), orbit.speed, orbit.state, jnp.asarray(moves.state_slope)
         slope = np.asarray(_read_moved(self.space, *at, _reader(orbit))[READ.index(name)])
-        sign = -1.0 if name == "film" else 1.0
+        sign = -1.0 if name in ("film", "contact") else 1.0
         return Value(sign * self.size(orbit, name), sign * slope, rpm)
 
     def largest(self, name: str, low: float, high: float) -> Orbit:
         """Orbit between two speeds at which a quantity is largest; its speed is accurate to `WORST_AT`."""
-        minus = lambda speed: -float(np.nan_to_num(self.size(self.orbit(float(speed)), name), neginf=0.0))
+        minus = lambda speed: -max(-NO_ORBIT, self.size(self.orbit(float(speed)), name))  # also for NaN
         found = minimize_scalar(minus, bounds=(low, high), method="bounded", options={"xatol": WORST_AT * high})
         return self.orbit(float(found.x))
 
@@ -352,7 +355,9 @@ class OperatingRange(_AroundEdges):
             return found
         if len(self.handed_over) > before and min(r.slack(found[r.of])[0] for r in wanted[:2]) < -KEPT:
             self._anchors.pop()  # beyond a jump of an edge, where no gradient leads back
-            return "; ".join(self.handed_over[before:])
+            jumped = "; ".join(self.handed_over[before:])
+            del self.handed_over[before:]
+            return jumped
         if "balance" in names:
             found["balance"] = balance_grade(self.space, self.operating, place)
         worst = self.worst(place, tuple(name for name in ("multiplier", *READ) if name in names))
@@ -433,8 +438,9 @@ class OperatingRange(_AroundEdges):
         return through.value(through.largest("multiplier", speeds[k - 1], speeds[k + 1]), "multiplier")
 
     def worst(self, place: Float[np.ndarray, " n"], names: tuple[str, ...]) -> dict[str, Value] | str:
-        """Worst values over the operating range of some of `multiplier`, `film`, `land force`, `drag`; or why there are
-        none. `film` is the least distance of cage and land [m], negative in contact."""
+        """Worst values over the operating range of some of `multiplier`, `film`, `contact`, `land force`, `drag`; or
+        why there are none. `film` is the least distance of cage and land [m], and `contact` that from the onset of
+        their contact, negative in contact."""
         if names and (through := self.through(place)) is not None:
             return {name: through.worst(name, *self.operating) for name in names}
         return "the orbits of the operating range are lost" if names else {}

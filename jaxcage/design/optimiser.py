@@ -63,6 +63,7 @@ class Design:
     - `at_bound`: parameters at a bound; `worst`: value of each requirement for the worst bearing within the tolerances.
     - `notes`: edges that were replaced; `budget`: admissible width of each tolerance.
     - `evaluations`: number of designs whose edges were solved for; `checked`: simulations from many initial states.
+    - `lost`: why no value of the design is known, empty if they are.
     """
 
     model: AbstractForcedSystem
@@ -83,6 +84,7 @@ class Design:
     evaluations: int
     path: list[dict[str, float]]
     checked: Checked | None
+    lost: str = ""
 
     @property
     def verdict(self) -> str:
@@ -98,8 +100,9 @@ class Design:
         rows += [f"  {name} = {value:.6g}" for name, value in self.values.items()]
         for r in self.requirements:
             unit = "" if r.unit == "1" else f" {r.unit}"
-            was = f"{self.before[r.of].value:.4g}" if r.of in self.before else "unknown"
-            rows.append(f"  {r.name}: {was} -> {self.after[r.of].value:.4g}{unit} (limit {r.limit:.4g})")
+            was, now = (f"{x[r.of].value:.4g}" if r.of in x else "unknown" for x in (self.before, self.after))
+            rows.append(f"  {r.name}: {was} -> {now}{unit} (limit {r.limit:.4g})")
+        rows += [f"  {self.lost}"] if self.lost else []
         return "\n".join(rows)
 
 
@@ -412,7 +415,8 @@ def _budget(problem: Problem, trial: Trial) -> list[Budget]:
         if name not in tolerance:
             continue
         width = tolerance[name].upper - tolerance[name].lower
-        takes = np.abs(trial.slack_slope[:, i]) * width / 2 / space.span[i]
+        slope = trial.slack_slope[:, i] / space.span[i]
+        takes = np.abs(slope * np.where(slope > 0, tolerance[name].lower, tolerance[name].upper))
         room = np.divide(np.maximum(trial.slack, 0.0), takes, out=np.full(takes.size, np.inf), where=takes > 0)
         k, reached = int(np.argmin(room)), 1.0
         limit = problem.wanted[k].name if np.isfinite(room[k]) else ""
@@ -450,7 +454,7 @@ def _described(problem: Problem, best: np.ndarray, checked: Checked | None) -> D
         before=own.values,
         after=trial.values,
         feasible=feasible,
-        short={r.name: float(-s * r.size) for r, s in zip(wanted, slack, strict=True) if s < -KEPT},
+        short={r.name: float(-s * r.size) for r, s in zip(wanted, slack, strict=True) if s < -KEPT and not trial.lost},
         conflict=conflict,
         prices=prices,
         at_bound=tuple(n for n, v in zip(names, x, strict=True) if min(v, 1 - v) < AT_BOUND),
@@ -460,4 +464,5 @@ def _described(problem: Problem, best: np.ndarray, checked: Checked | None) -> D
         evaluations=len(problem.solved),
         path=[space.values(t.place) | {"cost": t.cost} for t in problem.trials.values() if not t.lost],
         checked=checked,
+        lost=trial.lost,
     )

@@ -69,10 +69,11 @@ def listed(keep: Requirements, model: Any) -> list[Requirement]:
     if keep.decay is not None:
         limit = float(np.exp(-1 / keep.decay))
         found.append(Requirement("decay of a disturbance", "multiplier", limit, -1.0, "1", 1 - limit))
-    apart = float((1 - model.contact.onset) * model.clearance) if keep.land_force == 0 else None
-    for name, least in (("least film", keep.film), ("no contact with the land", apart)):
-        if least is not None:
-            found.append(Requirement(name, "film", least, 1.0, "m", max(least, 1e-6)))
+    if keep.film is not None:
+        found.append(Requirement("least film", "film", keep.film, 1.0, "m", max(keep.film, 1e-6)))
+    if keep.land_force == 0:
+        size = max(float((1 - model.contact.onset) * model.clearance), 1e-6)
+        found.append(Requirement("no contact with the land", "contact", 0.0, 1.0, "m", size))
     for name, of, unit, most in (
         ("land force", "land force", "N", keep.land_force or None),
         ("balance grade", "balance", "mm/s", keep.balance),

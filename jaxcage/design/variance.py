@@ -80,6 +80,7 @@ def global_sensitivity(
     if lost := int(np.sum(~np.isfinite(by_block).all(axis=1))):
         raise InputError(f"All designs must have a value, but {lost} of {len(places)} have none.")
     f = by_block.mean(axis=1).reshape(n + 2, samples)
+    f = f - f[:2].mean()  # a large mean would be multiplied by the noise of the first-order estimator
 
     def shares(f: np.ndarray) -> np.ndarray:
         """First-order and total indices from values at both sample sets, and at the first with one column swapped."""

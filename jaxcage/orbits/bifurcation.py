@@ -109,7 +109,7 @@ def bifurcation(
         found by `branch`.
     - `guess`: an `Orbit`, a `Point`, or a pair (state [SI], value of the parameter).
     - `parameter`: `"speed"`, the name of a parameter, or a function that picks it from the system.
-    - `speed`: speed [rad/s], if it is not the parameter and `guess` does not contain it.
+    - `speed`: speed [rad/s], if it is not the parameter; by default that of `guess`.
     - `periods`: revolutions after which the orbit closes; by default those of `guess`, else 1.
 
     **Returns:** `Point`; if none is found there is no exception (see `Point.status`). The function works under `jit`
@@ -124,7 +124,7 @@ def bifurcation(
     near = guess if isinstance(guess, Orbit | Point) else None
     periods = (1 if near is None else near.periods) if periods is None else periods
     start = read_start("guess", guess, system, parameter, speed)
-    given = Given(system, jnp.asarray(start.speed if speed is None else speed, dtype=float))
+    given = Given(system, start.speed)
 
     def find(begin: Start) -> Point:
         def by(method: AbstractMethod, counts: Counts) -> Point:

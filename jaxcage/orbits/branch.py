@@ -69,7 +69,7 @@ def branch(
     lower: float,
     upper: float,
     speed: Scalar | None = None,
-    periods: int = 1,
+    periods: int | None = None,
     steps: StepControl = StepControl(),
     method: AbstractMethod | None = None,
 ) -> Branch:
@@ -81,18 +81,18 @@ def branch(
     - `orbit`: an `Orbit`, a `Point`, or a pair (state [SI], value of the parameter) near an orbit.
     - `parameter`: `"speed"`, the name of a parameter, or a function that picks it from the system.
     - `lower`, `upper`: range of the parameter [SI], in which `orbit` lies.
-    - `speed`: speed [rad/s], if it is not the parameter and `orbit` does not contain it.
-    - `periods`: revolutions after which the orbit closes; those of `orbit`, if it is an `Orbit` or `Point`.
+    - `speed`: speed [rad/s], if it is not the parameter; by default that of `orbit`.
+    - `periods`: revolutions after which the orbit closes; by default those of `orbit`, else 1.
     - `steps`: step lengths; in units of 1/20 of the range for the parameter, and of the system's scale for the state.
 
     **Returns:** `Branch`. **Raises:** `ValueError` if there is no orbit near `orbit`, or if the range is not finite;
     `RuntimeError` without double precision.
     """
     require_x64()
+    if periods is None:
+        periods = int(orbit.periods) if isinstance(orbit, Orbit | Point) else 1
     require_at_least(1, periods=periods)
     start = read_start("orbit", orbit, system, parameter, speed)
-    if isinstance(orbit, Orbit | Point):
-        periods = int(orbit.periods)
     problem = orbit_curves(Given(system, start.speed), parameter, lower, upper, method, periods)
     at = float(start.at)
     problem.require_inside("orbit", at)

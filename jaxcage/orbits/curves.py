@@ -145,7 +145,8 @@ def _point_curve(
     equations = point_equations(orbit, critical_of(point.kind), there, given, count)
     problem = ContinuationProblem(equations, given, counts, *limits)
     u = problem.unknowns(point.state, float(point.value), second)
-    return problem, first_points(problem, u[None], np.eye(1, u.size, u.size - 1), count // 2)
+    least = count // 2 if counts.chooses else 0
+    return problem, first_points(problem, u[None], np.eye(1, u.size, u.size - 1), least)
 
 
 def _followed(problem: ContinuationProblem, start: Points, steps: StepControl) -> Path:

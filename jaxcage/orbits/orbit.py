@@ -253,14 +253,16 @@ def periodic_orbit(
     return with_fallback(find, method, lambda found: found.converged)
 
 
-def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Guess | None) -> Float[Array, " dim"]:
-    """Return a guess, by default the first initial state, as an array without derivative."""
+def guess_state(
+    system: AbstractForcedSystem, speed: Scalar, guess: Guess | None, name: str = "guess"
+) -> Float[Array, " dim"]:
+    """Return a guess (argument `name`), by default the first initial state, as an array without derivative."""
     given: Any = system.initial_states(speed)[0] if guess is None else guess
     wanted = f"must be a state of {system.dimension} numbers"
     try:
         state = given.state if isinstance(given, Orbit) else jnp.stack([jnp.asarray(c, dtype=float) for c in given])
     except (TypeError, ValueError) as error:  # not numbers, or of unequal shapes
-        raise ArgumentError("guess", said=f"{wanted}, but {shown(guess)} was given.") from error
+        raise ArgumentError(name, said=f"{wanted}, but {shown(guess)} was given.") from error
     if state.shape != (system.dimension,):
-        raise ArgumentError("guess", said=f"{wanted}, but has shape {state.shape}.")
+        raise ArgumentError(name, said=f"{wanted}, but has shape {state.shape}.")
     return jax.lax.stop_gradient(state)

@@ -145,7 +145,8 @@ class Point(eqx.Module):
         differentiable. `periods`: revolutions after which the orbit closes; `steps`: steps per revolution.
     - `error`: change of the value with half the steps or, if larger, twice the change with an odd number near three
         quarters of them [SI]; infinite if these do not find it, NaN if the method has no number of steps; for an
-        unexplained change the distance within which it lies. Under `jit`, `vmap` and `grad` only half are tried.
+        unexplained change the distance within which it lies. Under `jit`, `vmap` and `grad`, and with a
+        method of its own, only half are tried.
     - `residual`: largest component of the equations, in units of the scale.
     - `transversality`: d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is
         infinite, the drift p dP/d parameter of the map along the critical direction, with p q = 1. It is not computed
@@ -249,14 +250,16 @@ class Start(NamedTuple):
 def read_start(
     name: str, guess: Any, system: AbstractForcedSystem, parameter: Parameter, speed: Scalar | None
 ) -> Start:
-    """Return state, speed and value of an orbit, a point, or a pair (state, value), without derivatives.
+    """Return state, speed and value of an orbit, a point, or a pair (state, value). Only the speed has derivatives.
+
+    A `speed` replaces that of an orbit or point, unless it is the parameter.
 
     **Raises:** `ArgumentError`, for the argument called `name`, if it is none of these or has no speed.
     """
     at: Any
     if isinstance(guess, Orbit | Point):
-        state, speed = guess.state, guess.speed
-        at = value_of(system, speed, parameter)
+        state, at = guess.state, value_of(system, guess.speed, parameter)
+        speed = guess.speed if speed is None else speed
         if isinstance(guess, Point) and not is_traced(guess):
             require_found(guess, name)
         if isinstance(guess, Point) and guess.parameter == parameter:
@@ -270,5 +273,5 @@ def read_start(
     if speed is None:
         raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
     require_speeds(system, speed)
-    state = guess_state(system, speed, state)
+    state = guess_state(system, speed, state, name)
     return Start(state, jnp.asarray(speed, dtype=float), frozen(jnp.asarray(at, dtype=float)))

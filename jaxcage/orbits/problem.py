@@ -211,7 +211,7 @@ def counted(method: AbstractMethod | None, most: int = MOST, solver: str = "rk4"
     if not isinstance(chosen, FixedSteps):
         begin, last = 1, 1
     elif method is not None:
-        begin, last = jnp.maximum(chosen.steps // 2, 1), chosen.steps
+        begin, last = (chosen.steps + 1) // 2, chosen.steps
     counts = Counts(jnp.asarray(begin, int), jnp.asarray(last, int), jnp.asarray(float(method is None)))
     return by_steps(chosen, 1), counts
 

@@ -58,14 +58,14 @@ def _reached(r: Requirement, each: Value) -> str:
 
 
 def stricter(found: Design) -> dict[str, float]:
-    """Cost of a limit that is 10 % stricter, for each binding requirement."""
+    """Cost of a limit that is 10 % stricter, for each binding requirement whose limit is not 0."""
     limits, by = {r.name: r for r in found.requirements}, {}
     for name, price in found.prices.items():
         r = limits[name]
         step = 0.1 * abs(r.limit)
         if r.of == "multiplier":  # exp(-1/N), with N revolutions to fall to 1/e
             step = 0.1 * -r.limit * math.log(r.limit)
-        by[name] = price * step
+        by |= {name: price * step} if step else {}
     return by
 
 
