@@ -111,6 +111,19 @@ def test_zones_are_what_is_left_between_the_stretches(name):
         assert result.principal is None
 
 
+def test_where_a_branch_was_not_followed_further_the_range_has_an_edge_of_unknown_mechanism():
+    below = stretch(2000, 9000, met=30, open_below=True, open_above=True)
+    above = stretch(12000, 20000, family=1, open_below=True, open_above=True)
+    result = jc.unstable_ranges(found(below, above))
+    (zone,) = result.zones
+    assert ends(result) == [(9000, 12000)] and not result.edges
+    assert {(e.basis, e.mechanism, np.isnan(e.uncertainty_rpm)) for e in (zone.onset, zone.exit)} == {
+        ("followed", "unknown", True)
+    }
+    shown = str(jc.show.unstable_table("this", result))
+    assert "9000" in shown and "nan" not in shown and "past range" not in shown
+
+
 def test_principal_stretch_is_the_one_of_the_conventional_start():
     """The first start decides; then all of them; then the width. What overlaps the principal one only coexists."""
     long = stretch(2000, 9000, family=0, met=40, first=5, open_below=True)

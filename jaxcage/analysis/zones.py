@@ -41,7 +41,8 @@ class Edge:
     mechanism: str = "unknown"
     """Mechanism: `period-doubling`, `Neimark-Sacker`, `fold` or `unknown`."""
     basis: str = "statistical"
-    """Source: `statistical`, from a sweep; `located`, a bifurcation that was solved for."""
+    """Source: `statistical`, from a sweep; `located`, a bifurcation that was solved for; `followed`, the last orbit of
+    a branch whose end was not found, without an uncertainty."""
 
     def __str__(self) -> str:
         if self.basis == "statistical":

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis import Zone, Zones, closing_width
+from ..analysis import Edge, Zone, Zones, closing_width
 from ..quantities import notebook_html
 from .point import Point
 from .search import StableRange, SynchronousOrbits
@@ -29,8 +29,9 @@ from .search import StableRange, SynchronousOrbits
 class UnstableRanges:
     """Unstable ranges of the synchronous orbit between two speeds, ascending.
 
-    An edge is None if a range extends beyond the speeds searched. `edges` holds the edges by name, `zone 1 onset`,
-    `zone 1 exit`, `zone 2 onset`, ..., and `coexisting` the result of `SynchronousOrbits.coexisting` at each.
+    An edge is None if a range extends beyond the speeds searched; where the branch was not followed further, its
+    mechanism is unknown. `edges` holds the bifurcations by name, `zone 1 onset`, `zone 1 exit`, `zone 2 onset`, ...,
+    and `coexisting` the result of `SynchronousOrbits.coexisting` at each.
     `principal` is the stretch on which most simulations from the conventional initial state settled.
     """
 
@@ -103,25 +104,29 @@ def unstable_ranges(found: SynchronousOrbits, close_below_rpm: float | None = No
     groups.sort(key=lambda g: g.low.lower_rpm)
     tops = [None, *(g.high for g in groups)]
     bottoms = [*(g.low for g in groups), None]
-    edge = lambda point: None if point is None else point.as_edge("unstable")
     zones: list[Zone] = []
     edges: dict[str, Point] = {}
     for before, after in zip(tops, bottoms, strict=True):
-        onset = None if before is None else before.upper
-        leaves = None if after is None else after.lower
         open_below = before is None and after is not None and after.lower_rpm - found.lower_rpm < close_below_rpm
         open_above = after is None and before is not None and found.upper_rpm - before.upper_rpm < close_below_rpm
-        if open_below or open_above or (before is not None and onset is None):
+        if open_below or open_above:
             continue
-        zones.append(Zone("unstable", edge(onset), edge(leaves), _share(found, onset, leaves)))
-        for name, point in (("onset", onset), ("exit", leaves)):
+        onset = None if before is None else _edge(before.upper, before.upper_rpm)
+        leaves = None if after is None else _edge(after.lower, after.lower_rpm)
+        zones.append(Zone("unstable", onset, leaves, _share(found, onset, leaves)))
+        for name, point in (("onset", before and before.upper), ("exit", after and after.lower)):
             if point is not None:
                 edges[f"zone {len(zones)} {name}"] = point
     coexisting = {name: found.coexisting(float(p.speed)) for name, p in edges.items()}
     return UnstableRanges(tuple(zones), edges, coexisting, principal, close_below_rpm)
 
 
-def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) -> float:
+def _edge(point: Point | None, rpm: float) -> Edge:
+    """Return the end of a stable stretch, at `rpm` where no bifurcation was found, as an edge."""
+    return Edge(rpm, float("nan"), "unstable", basis="followed") if point is None else point.as_edge("unstable")
+
+
+def _share(found: SynchronousOrbits, onset: Edge | None, leaves: Edge | None) -> float:
     """Return the fraction of simulations in a range that did not settle on a synchronous orbit; NaN without any."""
     rpm = found.sweep.rpm
     inside = (rpm > (onset.speed_rpm if onset else 0.0)) & (rpm < (leaves.speed_rpm if leaves else np.inf))
