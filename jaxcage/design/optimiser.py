@@ -364,7 +364,7 @@ def _step(
 def _augmented(problem: Problem, begin: np.ndarray, say: Callable[[int], None]) -> np.ndarray:
     """Find the best place by optax's Adam on an augmented Lagrangian, whose multipliers are updated eight times."""
     place, weight, rounds = begin, 10.0, 8
-    multiplier, size = np.zeros(len(problem.wanted)), max(abs(problem.at(begin).cost), 1e-12)
+    multiplier, size = np.zeros(len(problem.wanted)), max(abs(problem.begin(begin).cost), 1e-12)
     for turn in range(rounds):
         adam = optax.adam(0.03 / (1 + turn))
         state = adam.init(jnp.asarray(place))
