@@ -161,8 +161,8 @@ class ZoneWidth(Slopes):
     """Width [rpm] of a zone of lasting chaos or of an unstable range, exit minus onset, and its slopes.
 
     Errors of the edges are independent; the gradient of an exact edge has none. A zone cut by the range is `open`: its
-    width is NaN, and its slopes are those of its one edge, with the opposite sign for an onset. It is `trusted` if all its edges are converged; `status` is
-    `converged`, `open: ...`, or says which edge should not be used, and why.
+    width is NaN, and its slopes are those of its one edge, with the opposite sign for an onset. It is `trusted` if all
+    its edges are converged; `status` is `converged`, `open: ...`, or says which edge should not be used, and why.
     """
 
     open: bool
