@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import elastic
 
 import jaxcage as jc
 
@@ -33,6 +34,7 @@ unwrap = inspect.unwrap
         (lambda: jc.sweep(DUFFING, ["a", "b"]), "`speeds` must be a number or an array of numbers"),
         (lambda: jc.sweep(DUFFING, np.array(["2020"], dtype="datetime64[Y]")), "of real numbers"),
         (lambda: jc.sweep(DUFFING, SPEEDS, initial_states=[(1.0,)]), "states of 2 numbers"),
+        (lambda: jc.sweep([CASE, elastic(CASE)], SPEEDS), "`model` must hold designs that differ in their numbers"),
         (
             lambda: jc.sweep("1a", SPEEDS),
             "`model` must be of kind AbstractForcedSystem or a row of things, but '1a'",

@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
-from jaxcage.solve import FINISHED, Engine, Lanes, engine_of, histories, say_once
+from jaxcage.solve import FINISHED, TOO_MANY, Engine, Lanes, engine_of, histories, say_once
 from jaxcage.solve.object_code import object_code
 
 
@@ -125,6 +125,28 @@ def test_a_law_that_has_no_machine_code_is_run_by_jax_and_says_so(name: str):
     with pytest.warns(UserWarning, match=f"operation `{name}`, which has no machine code"):
         found = jc.sweep(system, 1.5, discard=20, revolutions=20, confirm=False, horizon=0)
     assert set(found.label.values.ravel()) == {"periodic-1"}
+
+
+class Slow(jc.ForcedOscillator):
+    steps = jc.ForcedOscillator.steps._replace(most=10.0)
+
+    def slowness(self, speed: Any) -> Any:
+        return jnp.where(speed < 1, 100.0, 1.0)
+
+
+def test_a_slow_lane_gives_no_other_more_steps():
+    system = Slow(lambda tau, q, v, speed: (jnp.cos(tau) - q[0] - 0.1 * v[0],), coordinates=1)
+    outcomes = [
+        march(system, np.array(speeds), np.zeros((len(speeds), 2)), 2).outcome for speeds in ([2.0], [0.5, 2.0])
+    ]
+    assert outcomes[0].tolist() == [TOO_MANY] and outcomes[1].tolist() == [FINISHED, TOO_MANY]
+
+
+def test_equal_steps_between_samples_are_whole():
+    model, speed = jc.case("1a"), jc.rpm(5000, 5000, 1)
+    state = np.array([[float(c) for c in model.initial_states(speed[0])[0]]])
+    found = [histories(Lanes.of([model], speed), state, 64, 1, jc.method("rk4", n))[0] for n in (1000, 1024)]
+    np.testing.assert_array_equal(*found)
 
 
 def test_histories_are_run_again_until_their_error_is_allowed():

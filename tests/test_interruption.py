@@ -30,14 +30,17 @@ def stop_at_half(done: int, total: int) -> None:
 
 
 def goes_on(store: Path, *given: Any, **settings: Any) -> None:
-    """A sweep that is stopped has the finished speeds, and goes on to the data set of one that was not stopped."""
+    """A sweep that is stopped has the finished speeds, and goes on, with another number of cores, to the data set of
+    one that was not stopped."""
     whole = jc.sweep(*given, **settings)
     part = jc.sweep(*given, **settings, store=store, progress=stop_at_half)
     count = part.sizes["speed"]
     raw = jc.sweep(*given, **settings | {"confirm": False, "horizon": 0})
     assert 0 < count < whole.sizes["speed"] and part.identical(raw.isel(speed=slice(count)))
     seen: list[int] = []
-    again = jc.sweep(*given, **settings, store=store, progress=lambda done, total: seen.append(done))
+    with pytest.MonkeyPatch.context() as other:
+        other.setattr("jaxcage.lanes.run.cores", lambda: 3)
+        again = jc.sweep(*given, **settings, store=store, progress=lambda done, total: seen.append(done))
     assert again.identical(whole) and seen[0] == part["label"].size
 
 

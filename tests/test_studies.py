@@ -230,4 +230,6 @@ def test_code_of_ones_own_needs_a_name_and_a_version(tmp_path: Path, system: Any
     said = f"`name` and `version` must be given, since a store cannot tell .* own {own} "
     with pytest.raises(ValueError, match=said):
         jc.study(system, {"speed": SPEEDS}, store=tmp_path / "study.zarr", **OPTIONS | given)
+    with pytest.raises(ValueError, match=f"`store` must be left out, since .* own {own} .*`study` takes a name"):
+        jc.sweep(system, SPEEDS, store=tmp_path / "sweep.zarr", confirm=False, horizon=0)
     assert list(tmp_path.iterdir()) == []

@@ -133,6 +133,16 @@ def test_lanes_leave_chaos_when_its_clock_says_so(turning):
     assert np.all(label[leaves & (ends > 120)] == "transient")
 
 
+def test_exponents_of_the_last_revolutions_leave_the_rest_as_it_is():
+    options = dict(discard=100, revolutions=100, confirm=False, horizon=0, initial_states=1)
+    whole, last = (jc.sweep(HARDENING, np.array([0.8, 1.5]), exponent_revolutions=n, **options) for n in (0, 10))
+    assert last.sizes["growth_block"] == 2 and set(last.label.values.ravel()) == {"periodic-1"}
+    for name, tolerance in {"strobe": 1e-4, "exponents": 0.05, "steps": 4.0}.items():
+        np.testing.assert_allclose(last[name].values, whole[name].values, atol=tolerance)
+    with pytest.raises(ValueError, match="`exponent_revolutions` must be 0 or above 95 with a horizon, but is 10"):
+        jc.sweep(HARDENING, np.array([0.8, 1.5]), exponent_revolutions=10, **options | {"horizon": 3000})
+
+
 def test_a_ramp_takes_as_long_as_its_rate_says():
     first, last, seconds = 300.0, 1500.0, 7.0
     count = ramp_revolutions(HARDENING, first, last, seconds)

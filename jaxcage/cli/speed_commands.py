@@ -130,7 +130,7 @@ def swept(subject: Subject, speeds: Any, run: o.RunOptions, out: str | None = No
     bearing with its rollers the sweep can be stopped."""
     kept, settings = None, jc.lanes.Run.of(subject.model, **run.settings)
     if subject.with_rollers and out is not None:
-        given = jc.files.configuration(subject.model), speeds.tolist(), run.settings, jc.solve.cores(), jc.__version__
+        given = jc.files.configuration(subject.model), speeds.tolist(), run.settings, jc.__version__
         kept = Path(out) / f"sweep_{subject.name}_unfinished_{zlib.crc32(repr(given).encode()):08x}.zarr"
     stage = f"lanes of {settings.discard + settings.revolutions} revolutions"
     told = partial(report if out is None else report_lanes, stage)

@@ -127,7 +127,7 @@ def run_unsettled(run: Run, scale: Float[np.ndarray, "lanes dim"], onward: Onwar
         nan = lambda *shape, count=lanes.size: np.full((count, *shape), np.nan)
         closed, strobe = closing_period(new.strobe, scale[lanes]) > 0, nan(run.keep, scale.shape[1])
         strobe[:, run.keep - short :] = new.strobe
-        nothing = {"growth": nan(run.blocks, run.exponents), "doubt": nan(run.exponents)}
+        nothing = {"growth": nan(run.followed, run.exponents), "doubt": nan(run.exponents)}
         new = new._replace(strobe=strobe, integrals=nan(run.blocks, 0), largest=nan(run.blocks, 0), **nothing)
         if seen is None:
             seen = new

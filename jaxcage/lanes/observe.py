@@ -60,7 +60,7 @@ class Observation(NamedTuple):
     growth: Float[np.ndarray, "lanes followed exponents"]
     """Mean logarithmic growth of tangent vectors per revolution in each block."""
     peak: Float[np.ndarray, " lanes"]
-    """Largest excursion while observed; for a cage the eccentricity ratio."""
+    """Largest excursion while observed, or while tangent vectors align before; for a cage the eccentricity ratio."""
     error: Float[np.ndarray, " lanes"]
     """Largest error of a revolution, in units of the scale."""
     doubt: Float[np.ndarray, "lanes exponents"]
@@ -177,6 +177,8 @@ class _Observer:
         cuts = {0, end, pushed if run.exponents else run.discard}
         if self.averages:
             cuts |= {run.discard, *range(run.discard, end, run.block)}
+        elif pushed > run.discard:
+            cuts |= {run.discard}
         return [(a, b, a >= pushed) for a, b in itertools.pairwise(sorted(cuts))]
 
     def once(self, method: AbstractMethod, some: Int[np.ndarray, " some"]) -> Observation:
@@ -201,7 +203,7 @@ class _Observer:
             plain = self.lanes.engine(0, method, samples)
             engine = self.lanes.engine(run.exponents, method, samples) if pushed else plain
             numbers = self.lanes.numbers(engine, some[alive])
-            seen = stop == end or (self.averages and begin >= run.discard)
+            seen = stop == end or begin >= run.discard
             if begin == 0 or (self.averages and seen):
                 error[alive] = np.maximum(error[alive], self._error(plain, some[alive], state[alive, None], method))
             strobes = (stop - begin) * samples
@@ -231,9 +233,11 @@ class _Observer:
                 part = slice(block * strobes, (block + 1) * strobes)
                 found.place[alive, part] = self.lanes.each(_centres, some[alive], recorded)
                 continue
-            found.strobe[alive] = ran.strobe[:, held - run.keep :] * scale[alive, None, :]
-            peak[alive] = np.maximum(ran.peak, begun)
-            found.doubt[alive] = self._doubt(engine, numbers, ran, method)
+            latest = ran.strobe[:, -min(run.keep, strobes) :] * scale[alive, None, :]
+            found.strobe[alive] = np.concatenate([found.strobe[alive], latest], axis=1)[:, -run.keep :]
+            peak[alive] = np.fmax(peak[alive], np.maximum(ran.peak, begun))
+            if pushed and run.exponents:
+                found.doubt[alive] = self._doubt(engine, numbers, ran, method)
             if held > 1:
                 last_ones = ran.strobe[:, -(CHECKED + 1) :]
                 error[alive] = np.maximum(error[alive], self._error(plain, some[alive], last_ones, method))
@@ -247,8 +251,6 @@ class _Observer:
     ) -> Float[np.ndarray, "some exponents"]:
         """Integration error of the exponents per revolution: three times the difference of the mean growth over a few
         further revolutions from that by the method's reference."""
-        if not ran.tangents.shape[1]:
-            return np.zeros((len(ran.state), 0))
         options: dict[str, Any] = dict(tangents=ran.tangents, step=ran.step, threads=cores())
         further = lambda chosen: engine(numbers, ran.state, FURTHER, 1, chosen, **options).growth.mean(axis=1)
         return SURE * np.abs(further(method) - further(method.reference))

@@ -77,14 +77,14 @@ class Plan:
         """
         models = _models(designs)
         speed = _checked_speeds(models[0], speeds)
-        begin = np.stack([states_at(model, speed, states) for model in models])
-        shape = begin.shape[:3]
+        begins = [states_at(model, speed, states) for model in models]
+        shape = len(models), *begins[0].shape[:2]
         which, at = (np.repeat(x.ravel(), shape[2]) for x in np.indices(shape[:2]))
         axes: dict[str, int] = dict(zip((DESIGN, SPEED, START), shape, strict=True))
         if not isinstance(designs, Sequence):
             del axes[DESIGN]
-        lanes = Lanes.of(models, speed[at], which)
-        return cls(lanes, begin.reshape(-1, begin.shape[-1]), axes, {SPEED: ((SPEED,), speed)})
+        lanes, dim = Lanes.of(models, speed[at], which), models[0].dimension
+        return cls(lanes, np.stack(begins).reshape(-1, dim), axes, {SPEED: ((SPEED,), speed)})
 
     @classmethod
     def one_speed_each(cls, designs: Sequence[AbstractForcedSystem], speeds: Float[np.ndarray, " designs"]) -> "Plan":
@@ -124,7 +124,7 @@ def states_at(
     model: AbstractForcedSystem, speed: Float[np.ndarray, " speeds"], states: States
 ) -> Float[np.ndarray, "speeds states dim"]:
     """Initial states at each speed: all or some of the model's own, or the given ones."""
-    if states is None or isinstance(states, int):
+    if states is None or isinstance(states, int | np.integer):
         own = Lanes.of([model], speed).each(own_states, np.arange(speed.size))
         if states is not None and not 1 <= states <= own.shape[1]:
             raise ArgumentError(

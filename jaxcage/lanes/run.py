@@ -26,7 +26,7 @@ from .horizon import follow, run_unsettled
 from .observe import Observation, Progress, observe
 from .plan import SPEED, Plan, Speeds, States
 from .settings import Run
-from .store import Store, Study
+from .store import Store, Study, lanes_of_chunks
 
 
 PARTS = 4
@@ -211,7 +211,8 @@ def sweep(
     run = Run.of(plan.model, **settings)
     if store is None:
         return run_lanes(plan, run, progress)
-    if isinstance(model, Sequence) or not isinstance(initial_states, int | None):
+    if isinstance(model, Sequence) or not isinstance(initial_states, int | np.integer | None):
         raise ArgumentError("store", said="goes with one model from its own initial states, but others were given.")
-    grid = Grid({SPEED: plan.coordinates[SPEED][1]}, {}, 0, 0, plan.shape[1], WIDTH * cores())
+    lanes = lanes_of_chunks(store, WIDTH * cores())  # it may have been begun with another number of cores
+    grid = Grid({SPEED: plan.coordinates[SPEED][1]}, {}, 0, 0, plan.shape[1], lanes)
     return run_lanes(plan, run, progress, Store(store, Study(model, grid, run, observations=True)))

@@ -74,6 +74,9 @@ class Run:
             raise ArgumentError(
                 "confirm", "horizon", "settled", said="must be left out for a model whose revolutions do not repeat."
             )
+        if self.followed < self.blocks and self.horizon:
+            said = f"must be 0 or above {self.revolutions - self.block} with a horizon, but is "
+            raise ArgumentError("exponent_revolutions", said=f"{said}{self.exponent_revolutions}.")
 
     @property
     def block(self) -> int:

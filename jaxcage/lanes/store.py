@@ -115,8 +115,10 @@ class Store:
     def __init__(self, path: str | Path, study: Study):
         self.path, self.study = Path(path), study
         if (own := _own_code([study.model, study.run.method])) and not (study.name and study.version):
-            said = f"must be given, since a store cannot tell by itself whether your own {own} is still the same."
-            raise ArgumentError("name", "version", said=said)
+            why = f"since a store cannot tell by itself whether your own {own} is still the same"
+            if study.observations:  # a sweep, which has no name or version
+                raise ArgumentError("store", said=f"must be left out, {why}: `study` takes a name and a version.")
+            raise ArgumentError("name", "version", said=f"must be given, {why}.")
         with _going_on(self.path):
             if not os.path.lexists(self.path):
                 _create(self.path, study)
@@ -158,6 +160,14 @@ class Store:
                 left.unlink()
         for left in self.path.parent.glob(f".{self.path.name}.*.partial"):
             shutil.rmtree(left, ignore_errors=True)
+
+
+def lanes_of_chunks(path: str | Path, otherwise: int) -> int:
+    """Maximum number of lanes per chunk of the store at `path`; `otherwise` if there is none."""
+    try:
+        return json.loads(_opened(Path(path), "r")[0]["study"])["plan"]["lanes"]
+    except (FileNotFoundError, ValueError, KeyError, TypeError):  # `Store` says what is wrong with it
+        return otherwise
 
 
 def open_study(path: str | Path) -> xr.Dataset:

@@ -25,7 +25,7 @@ from .fields import SAMPLED, numbers_at, shape_of_numbers, traced_field
 from .ir import UnknownOperation, say_once
 from .layout import REVOLUTION, Tableau, layout_of
 from .loop import march_ir
-from .method import IMPLICIT, AbstractMethod, NativeSteps
+from .method import IMPLICIT, AbstractMethod, FixedSteps, NativeSteps
 from .object_code import function
 from .outcomes import FINISHED, March
 from .strobe_map import StrobeMap
@@ -128,7 +128,6 @@ class Engine:
         lanes, field, rows = len(state), self.field, self._rows
         n, moving = field.dimension, field.moving
         limits, more = self._limits, max(1.0, MOST_AT / method.tolerance) ** (1 / self._order)
-        most = limits.most * float(np.max(numbers.slow)) * more
         loaded = np.zeros((rows["first_step"].stop, lanes))
         loaded[:n], loaded[moving - field.beside : moving] = state[:, :n].T, state[:, n:].T
         if field.tangents:
@@ -136,6 +135,7 @@ class Engine:
             loaded[n : moving - field.beside] = tangents.reshape(lanes, -1).T
         given = np.broadcast_to(np.nan if step is None else step, lanes)
         loaded[rows["step"][0]] = np.where(np.isnan(given), limits.first, given)
+        loaded[rows["most"][0]] = limits.most * numbers.slow * more
         loaded[rows["peak"]] = 0.0 if field.excursion is not None else -np.inf
         wide = loaded[rows["fixed"].start : rows["fixed"].stop]
         if field.own_turn:
@@ -145,7 +145,7 @@ class Engine:
         strobe = np.full((lanes, keep, field.recorded), np.nan)
         growth = np.full((lanes, strobes, field.tangents), np.nan)
         queue = np.zeros(3, dtype=np.int64)
-        settings = np.array([method.tolerance, limits.longest, limits.shortest, most])
+        settings = np.array([method.tolerance, limits.longest, limits.shortest])
         arrays = (queue, settings, np.append(numbers.shared, 0.0), loaded, stored, strobe, growth)
         at = [x.ctypes.data for x in arrays]
         # For a large law a vector of one lane is faster than a vector of eight with a single lane in it.
@@ -346,7 +346,7 @@ class Lanes:
         found = [_in_arrays(system) for system in systems]
         rests = [eqx.filter(system, eqx.is_array, inverse=True) for system in found]
         if any(not eqx.tree_equal(rest, rests[0]) for rest in rests):
-            raise ArgumentError("systems", said="must hold systems that differ in their numbers only.")
+            raise ArgumentError("model", said="must hold designs that differ in their numbers only.")
         stacked = lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0]
         return cls(jax.tree.map(stacked, *found), len(systems), which, speed)
 
@@ -416,8 +416,10 @@ def histories(
     """States of lanes [SI] at `samples` phases of each of `revolutions`, and the largest error of a revolution [scale].
 
     The first state is the initial one. Lanes that fail, or have a NaN in it, are NaN. Those with a larger error than
-    the method allows are run again with smaller steps.
+    the method allows are run again with smaller steps. Equal steps are shortened to a whole number between samples.
     """
+    if isinstance(method, FixedSteps):
+        method = FixedSteps(method.solver, -(-method.steps // samples) * samples)
     total, size = samples * revolutions, CHUNK // samples + 1
     seen, error = np.full((lanes.speed.size, total, y0.shape[1]), np.nan), np.full(lanes.speed.size, np.nan)
     todo = np.flatnonzero(np.all(np.isfinite(y0), axis=1))

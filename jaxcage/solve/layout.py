@@ -110,6 +110,7 @@ def layout_of(field: Field, stages: int) -> Layout:
         "peak": field.watched,
         "steps": 1,
         "mark": 1,
+        "most": 1,
         "fixed": sum(field.wide),
         **dict.fromkeys(("phase", "error", "revolution", "first_step", "lane"), 1),
         "rate": field.span * stages,

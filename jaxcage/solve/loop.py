@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..models import ESCAPE
 from .ir import Code, Value, is_variable, number
 from .layout import REVOLUTION, Field, Layout, Tableau, fixed_numbers, layout_of, rates_arguments
 from .outcomes import FINISHED, NOT_FINITE, OUTSIDE, STUCK, TOO_MANY
@@ -22,8 +23,8 @@ def march_ir(field: Field, pair: str, width: int) -> str:
     """Module of a system, whose function `march` runs the lanes of a queue until it is empty.
 
     `march(queue, lanes, revolutions, keep, settings, shared, loaded, stored, strobe, growth)`: queue holds the next
-    lane, a stop flag, and the number of strobe states reached; settings are tolerance, largest step, smallest step,
-    maximum number of steps per revolution; loaded and stored have a row of all lanes for each of the first rows of
+    lane, a stop flag, and the number of strobe states reached; settings are tolerance, largest step, smallest step;
+    loaded and stored have a row of all lanes for each of the first rows of
     `layout_of`; strobe is (lanes, keep, recorded), a ring buffer; growth is (lanes, revolutions, tangents),
     squared lengths.
     """
@@ -195,12 +196,10 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     size = total_rows * width * 8
     w.line(f"call void @llvm.memset.p0.i64(ptr align 8 %memory, i8 0, i64 {size}, i1 false)")
     w.declarations.add("declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)")
-    for k, name in enumerate(("tolerance", "largest", "smallest", "most")):
+    for k, name in enumerate(("tolerance", "largest", "smallest")):
         w.line(f"%{name}_at = getelementptr double, ptr %settings, i64 {k}")
         w.line(f"%{name} = load double, ptr %{name}_at")
-    tolerance, largest, smallest, most = (
-        Value(f"%{name}", "double", False) for name in ("tolerance", "largest", "smallest", "most")
-    )
+    tolerance, largest, smallest = (Value(f"%{x}", "double", False) for x in ("tolerance", "largest", "smallest"))
     total, kept = (w.convert("sitofp", Value(f"%{x}", "i64", False), "double") for x in ("revolutions", "keep"))
     w.put(row["mark"], one)
     w.put(row["lane"], number(-1.0))
@@ -269,13 +268,12 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     for k, x in enumerate(map(w.widened, watched)):
         peak = w.get(row["peak"] + k)
         w.put(row["peak"] + k, w.select(w.both(moves, w.compare("gt", x, peak)), x, peak))
-    mark = w.select(w.both(moves, w.compare("gt", w.widened(watched[0]), number(2.0))), marked(OUTSIDE), mark)
+    mark = w.select(w.both(moves, w.compare("gt", w.widened(watched[0]), number(ESCAPE))), marked(OUTSIDE), mark)
     refused = w.both(runs, w.negated(fine), w.compare("lt", proposed, smallest))
     finite = w.compare("lt", size, number(np.inf))
     mark = w.select(refused, w.select(finite, marked(STUCK), marked(NOT_FINITE)), mark)
-    mark = w.select(
-        w.both(runs, w.compare("gt", taken, w.mul(most, w.add(w.get(row["revolution"]), one)))), marked(TOO_MANY), mark
-    )
+    most = w.mul(w.get(row["most"]), w.add(w.get(row["revolution"]), one))
+    mark = w.select(w.both(runs, w.compare("gt", taken, most)), marked(TOO_MANY), mark)
     w.put(row["mark"], mark)
     w.line(f"br i1 {w.any(over).text}, label %over, label %check")
 
