@@ -14,6 +14,7 @@ from test_whole_reference import SPEED, everything, random_state, right_side
 import jaxcage as jc
 from jaxcage.bearing import bar_stiffness, vg
 from jaxcage.models import BearingState, Traction
+from jaxcage.models.contacts import lambert_w
 
 
 def bearing(**changed):
@@ -193,6 +194,14 @@ def test_traction_curve(values):
     assert float(kappa(-0.37)) == -float(kappa(0.37))
     with pytest.raises(ValueError, match="peak"):
         Traction(rest=0.06)
+
+
+def test_derivatives_of_lamberts_function():
+    """W(x) = x - x^2 + 3/2 x^3 - ..., and W' = 1/(exp(W) (1 + W)) anywhere."""
+    first, second = jax.grad(lambert_w), jax.grad(jax.grad(lambert_w))
+    assert [float(f(0.0)) for f in (first, second, jax.grad(second))] == pytest.approx([1, -2, 9], rel=1e-12)
+    w = float(lambert_w(-0.3))
+    assert float(second(-0.3)) == pytest.approx(-(w + 2) / (np.exp(2 * w) * (1 + w) ** 3), rel=1e-10)
 
 
 def test_traction_falls_with_the_viscosity():

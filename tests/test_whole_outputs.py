@@ -93,6 +93,17 @@ def test_the_synchronous_force_of_a_known_one(run):
         assert found[name].error == pytest.approx(0.0, abs=1e-9)
 
 
+def test_slips_where_the_outer_ring_turns():
+    """A cage that turns clockwise hardly slips; rollers that roll without turning have no spin to compare with."""
+    model = bearing(outer_speed=-SPEED)
+    ran = jc.simulate(model, SPEED, revolutions=1, samples=SAMPLES)
+    assert ran.total("cage_speed") < 0 and abs(measures(model, ran).value("cage_slip")) < 0.05
+    model = bearing(outer_speed=SPEED * float(model.inner_radius / model.outer_radius))
+    ran = jc.simulate(model, SPEED, revolutions=1, samples=SAMPLES)
+    assert measures(model, ran).value("roller_slip_max") == 0
+    assert not np.any(roller_history(model, ran).roller_slip)
+
+
 def beginning(found, n):
     """The first samples of a run, or of a history."""
     each = {f.name: getattr(found, f.name) for f in dataclasses.fields(found)}

@@ -10,7 +10,7 @@ from .._arguments import require_x64
 from .._errors import ArgumentError
 from .._pytrees import compiled
 from ..forces import Force, ImpactFromBearing
-from ..models import CAGE_QUANTITIES, FORCES, AbstractForcedSystem, CageHistory, CageModel, cage_values
+from ..models import FORCES, AbstractForcedSystem, CageHistory, CageModel, cage_quantities
 from ..quantities import Quantity, averaged, notebook_html
 from ..solve import Trajectory, simulate
 from .labels import scatter
@@ -131,8 +131,8 @@ def measures(model: AbstractForcedSystem, trajectory: Trajectory) -> Measures:
         )
     if model.beside:
         return _from_integrals(model, trajectory)
-    values = cage_values(cage_history(model, trajectory))  # pyright: ignore[reportArgumentType]
-    return Measures({q.name: Measured(q, float(values[q.name]), np.nan) for q in CAGE_QUANTITIES})
+    history = cage_history(model, trajectory)  # pyright: ignore[reportArgumentType]
+    return Measures({each.name: Measured(each, value, np.nan) for each, value in cage_quantities(history)})
 
 
 def _from_integrals(model: AbstractForcedSystem, trajectory: Trajectory) -> Measures:

@@ -29,7 +29,7 @@ class CageBody(NamedTuple):
 
     bar_length: Array
     bar_thickness: Array
-    """Along the pitch circle, where a bar is thinnest."""
+    """Along the pitch circle; nearer to the axis a bar is thinner, since the sides of a pocket are parallel."""
     bar_height: Array
     volume: Array
     gyration: Array

@@ -184,11 +184,11 @@ def bar_pulse(roller_mass: Scalar, cage_mass: Scalar, stiffness: Scalar, v0: Sca
 class ImpactFromBearing(AbstractLaw):
     """Synchronous impact (15) whose amplitude follows from the bearing: masses, bars, pocket clearance and load.
 
-    f_x = A sin tau with A = 2 n Q_1 cos(theta), theta the half angle of the loaded zone. (15) takes for Q the largest
-    force of an impact. That cannot be: an impact lasts a hundredth of a revolution, and a sine of that size would pass
-    on fifty times and more the momentum that a roller loses, more than all rollers have. Q_1 is the first harmonic of
-    the pulse instead, which passes on what one roller loses. It depends on masses, clearance and speed (A grows as its
-    square) and hardly on the stiffness, which determines the largest force of an impact.
+    f_x = A sin tau with A = 2 n Q_1 cos(theta), theta the half angle of the loaded zone at rest. (15) takes for Q the
+    largest force of an impact. That cannot be: an impact lasts a hundredth of a revolution, and a sine of that size
+    would pass on fifty times and more the momentum that a roller loses, more than all rollers have. Q_1 is the first
+    harmonic of the pulse instead, which passes on what one roller loses. It depends on masses, clearance and speed (A
+    grows as its square) and hardly on the stiffness, which determines the largest force of an impact.
 
     Rollers that hit alike cancel but for the multiples of Z: n counts the impacts per revolution that do not. Both
     constants are unknown. In whole bearings (NU2310, NU1014, NU215, cages of brass and PEEK, with and without drag, 0.6
@@ -232,7 +232,7 @@ class ImpactFromBearing(AbstractLaw):
 
 
 class RollerPassImpact(AbstractLaw):
-    """Pulse Q_cw(t) each time a roller enters or leaves the loaded zone, as a Fourier series."""
+    """Pulse Q_cw(t) each time a roller enters or leaves the loaded zone at rest, as a Fourier series."""
 
     law_name = "impact"
     kind = "roller_pass"

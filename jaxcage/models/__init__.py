@@ -45,7 +45,7 @@ from .bearing_states import (
     rollers_of as rollers_of,
 )
 from .cage import FORCES as FORCES, NEEDED as NEEDED, CageModel as CageModel
-from .cage_quantities import CAGE_QUANTITIES as CAGE_QUANTITIES, CageHistory as CageHistory, cage_values as cage_values
+from .cage_quantities import CageHistory as CageHistory, cage_quantities as cage_quantities
 from .cases import case as case
 from .contacts import Pockets as Pockets, Raceways as Raceways, Traction as Traction
 from .field import (

@@ -39,6 +39,9 @@ Many = Float[Array, "*rollers"] | float | int
 STALLED = 0.05
 """Speed of the cage over that of pure rolling below which its angle is no measure of progress."""
 
+NO_SPIN = 1e-9
+"""Spin of a rolling roller over the cage's speed that is rounding: surfaces of both rings move at one speed."""
+
 
 class Geometry(NamedTuple):
     """Directions of pockets, and of rollers from both ring centres."""
@@ -220,16 +223,16 @@ class BearingAtSpeed(AbstractField):
         roller_rates, passed = jax.vmap(self.roller_rates, in_axes=(0, None, 0))(rollers, cage, alone)
         sums = Passed(*jnp.sum(jnp.stack(passed), axis=1))
         body_rates, integrals = self.body_rates(cage, cos_sin(state.clock[0]), sums, f.land)
-        slip = jnp.max(jax.vmap(self.slip)(rollers.spin))
+        slip = jnp.max(self.slip(rollers.spin))
         lost = self.lost(cage.cage_speed, f.land.eps)
         watched = jnp.stack([lost, jnp.max(f.pocket.normal), f.land.size, slip, f.land.eps])
         clock = jnp.stack([cage.cage_speed, jnp.ones_like(cage.cage_speed)])
         moved = BearingState(jnp.stack(roller_rates), jnp.stack(body_rates), clock)
         return Rates(moved, jnp.stack(integrals), watched)
 
-    def slip(self, spin: Scalar) -> Array:
-        """Slip of a roller's spin against pure rolling."""
-        turns = self.rolling_spin != 0
+    def slip(self, spin: Many) -> Array:
+        """Slip of a roller's spin against pure rolling, 0 where rollers that roll do not turn but for rounding."""
+        turns = jnp.abs(self.rolling_spin) > NO_SPIN * jnp.abs(self.rolling_cage_speed)
         return jnp.where(turns, 1 - spin / jnp.where(turns, self.rolling_spin, 1.0), 0.0)
 
     def roller_rates(self, rollers: Rollers, cage: Bodies, f: Forces) -> tuple[tuple[Array, ...], Passed]:

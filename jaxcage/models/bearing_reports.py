@@ -5,7 +5,7 @@ out again by the laws that moved them.
 """
 
 import dataclasses
-import functools
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -59,7 +59,7 @@ def _at_samples(model: AbstractForcedSystem, speed: Scalar, states: BearingState
         x = jnp.sum(pocket.along * g.pocket_sin - pocket.out * g.pocket_cos)
         y = jnp.sum(-pocket.along * g.pocket_cos - pocket.out * g.pocket_sin)
         on_cage, land = jnp.stack([x, y]), jnp.stack([jnp.asarray(f.land.x), jnp.asarray(f.land.y)])
-        return -pocket.along, f.inner.load, f.inner.sliding, on_cage, land
+        return -pocket.along, f.inner.load, f.inner.sliding, on_cage, land, at.slip(state.rollers[1])
 
     return jax.lax.map(one, states, batch_size=BATCH)
 
@@ -70,7 +70,7 @@ def roller_history(model: Any, run: Any) -> RollerHistory:
     states = BearingState(*map(jnp.asarray, (run.rollers, run.bodies, run.integrals[:, :2])))
     found = tuple(map(np.asarray, _at_samples(model, jnp.asarray(speed), states)))
     place = run.bodies[:, 0:2] - (run.bodies[:, 5:7] if model.guidance == "inner" else 0.0)
-    pocket, inner, inner_sliding, on_cage, land = found
+    pocket, inner, inner_sliding, on_cage, land, slip = found
     n = model.bearing.n_rollers
     return RollerHistory(
         time=run.time,
@@ -79,7 +79,7 @@ def roller_history(model: Any, run: Any) -> RollerHistory:
         roller_angle=run.angle[:, None] + 2 * np.pi / n * np.arange(n) + run.rollers[:, 0],
         pocket_force=pocket,
         inner_load=inner,
-        roller_slip=1 - run.rollers[:, 1] / float(model.rolling_spin(speed)),
+        roller_slip=slip,
         inner_sliding=inner_sliding,
         pocket_on_cage=on_cage,
         land_on_cage=land,
@@ -102,71 +102,52 @@ def bearing_orders(model: Any, run: Any) -> dict[str, float]:
     }
 
 
-def _values(a: Averages) -> dict[str, np.ndarray]:
-    """Value of each quantity."""
-    lost = sum((a.mean(name) for name in LOSSES), np.zeros(()))
-    worn_by = a.numbers["wear_mm3_per_h_per_W"]
-    variance = a.mean("eccentricity_squared") - a.mean("eccentricity") ** 2
-    harmonic = lambda axis: 2 * np.hypot(a.mean(f"pocket_{axis}_cos"), a.mean(f"pocket_{axis}_sin"))
-    return {
-        "cage_slip": 1 - 2 * np.pi * a.revolutions / a.integrals["time"] / a.numbers["rolling_cage_speed"],
-        "roller_slip_max": a.largest["roller_slip"],
-        "pocket_force_max_N": a.largest["pocket_force"],
-        "pocket_force_peak_N": a.largest["pocket_force"],
-        "pocket_force_mean_sum_N": a.mean("pocket_force"),
-        "land_force_max_N": a.largest["land_force"],
-        "land_force_peak_N": a.largest["land_force"],
-        "pocket_impulse_N_s": a.per_revolution("pocket_force"),
-        "land_impulse_N_s": a.per_revolution("land_force"),
-        "pocket_wear_mm3_per_h": worn_by * a.mean("pocket_rubbing"),
-        "land_wear_mm3_per_h": worn_by * a.mean("land_rubbing"),
-        "friction_power_W": lost,
-        "friction_torque_N_m": lost / a.numbers["relative_speed"],
-        **{f"power_{name}_W": a.mean(name) for name in LOSSES},
-        "land_power_W": a.mean("film") + a.mean("land_contact"),
-        "input_power_W": a.mean("input"),
-        "eccentricity_mean": a.mean("eccentricity"),
-        "eccentricity_std": np.sqrt(np.maximum(variance, 0.0)),
-        "eccentricity_max": a.largest["eccentricity"],
-        "whirl_ratio": a.integrals["whirl"] / a.integrals["cage_speed"],
-        "synchronous_force_x_N": harmonic("x"),
-        "synchronous_force_y_N": harmonic("y"),
-    }
+_Of = Callable[[Averages], np.ndarray]
+_mean: Callable[[str], _Of] = lambda name: lambda a: a.mean(name)
+_most: Callable[[str], _Of] = lambda name: lambda a: a.largest[name]
+_turn: Callable[[str], _Of] = lambda name: lambda a: a.per_revolution(name)
+_worn: Callable[[str], _Of] = lambda name: lambda a: a.numbers["wear_mm3_per_h_per_W"] * a.mean(f"{name}_rubbing")
+_slip: _Of = lambda a: 1 - 2 * np.pi * a.revolutions / a.integrals["time"] / np.abs(a.numbers["rolling_cage_speed"])
+_variance: _Of = lambda a: a.mean("eccentricity_squared") - a.mean("eccentricity") ** 2
+_deviation: _Of = lambda a: np.sqrt(np.maximum(_variance(a), 0.0))
+_lost: _Of = lambda a: sum((a.mean(name) for name in LOSSES), np.zeros(()))
+_torque: _Of = lambda a: _lost(a) / a.numbers["relative_speed"]
+_in_land: _Of = lambda a: a.mean("film") + a.mean("land_contact")
+_whirl: _Of = lambda a: a.integrals["whirl"] / a.integrals["cage_speed"]
+_first_x: _Of = lambda a: 2 * np.hypot(a.mean("pocket_x_cos"), a.mean("pocket_x_sin"))
+_first_y: _Of = lambda a: 2 * np.hypot(a.mean("pocket_y_cos"), a.mean("pocket_y_sin"))
 
 
 _GROWS = "mean of the largest {} forces of the blocks, which grows with their length"
-_HARMONIC = "first harmonic of the pocket forces, horizontal amplitude"
-_TEXTS = {
-    "cage_slip": ("1", "cage slip: 1 less the mean cage speed over that of pure rolling"),
-    "roller_slip_max": ("1", "largest slip of a roller's spin against pure rolling"),
-    "pocket_force_max_N": ("N", "largest pocket force"),
-    "pocket_force_peak_N": ("N", _GROWS.format("pocket")),
-    "pocket_force_mean_sum_N": ("N", "mean of the sum of all pocket forces"),
-    "land_force_max_N": ("N", "largest force of the land on the cage"),
-    "land_force_peak_N": ("N", _GROWS.format("land")),
-    "pocket_impulse_N_s": ("N s", "integral of all pocket forces over a revolution of the cage"),
-    "land_impulse_N_s": ("N s", "integral of the land's force on the cage over a revolution"),
-    "pocket_wear_mm3_per_h": ("mm^3/h", "Archard wear of all pockets, with the coefficient of `wear`"),
-    "land_wear_mm3_per_h": ("mm^3/h", "Archard wear of the cage's guiding land"),
-    "friction_power_W": ("W", "mean power lost"),
-    "friction_torque_N_m": ("N m", "power lost over the shaft's speed relative to the outer ring"),
-    **{f"power_{name}_W": ("W", f"mean power lost to {text}") for name, text in LOSSES.items()},
-    "land_power_W": ("W", "mean power lost in the guiding land, film and contact"),
-    "input_power_W": ("W", "mean power of shaft and outer ring"),
-    "eccentricity_mean": ("1", "mean eccentricity ratio"),
-    "eccentricity_std": ("1", "standard deviation of the eccentricity ratio over time"),
-    "eccentricity_max": ("1", "largest eccentricity ratio"),
-    "whirl_ratio": ("1", "mean angular speed of the cage's centre about the land's, over that of the cage"),
-    "synchronous_force_x_N": ("N", _HARMONIC),
-    "synchronous_force_y_N": ("N", "first harmonic of the pocket forces, vertical amplitude"),
+_ROWS: dict[str, tuple[str, str, _Of]] = {
+    "cage_slip": ("1", "cage slip: 1 less the mean cage speed over that of pure rolling", _slip),
+    "roller_slip_max": ("1", "largest slip of a roller's spin against pure rolling", _most("roller_slip")),
+    "pocket_force_max_N": ("N", "largest pocket force", _most("pocket_force")),
+    "pocket_force_peak_N": ("N", _GROWS.format("pocket"), _most("pocket_force")),
+    "pocket_force_mean_sum_N": ("N", "mean of the sum of all pocket forces", _mean("pocket_force")),
+    "land_force_max_N": ("N", "largest force of the land on the cage", _most("land_force")),
+    "land_force_peak_N": ("N", _GROWS.format("land"), _most("land_force")),
+    "pocket_impulse_N_s": ("N s", "integral of all pocket forces over a revolution of the cage", _turn("pocket_force")),
+    "land_impulse_N_s": ("N s", "integral of the land's force on the cage over a revolution", _turn("land_force")),
+    "pocket_wear_mm3_per_h": ("mm^3/h", "Archard wear of all pockets, with the coefficient of `wear`", _worn("pocket")),
+    "land_wear_mm3_per_h": ("mm^3/h", "Archard wear of the cage's guiding land", _worn("land")),
+    "friction_power_W": ("W", "mean power lost", _lost),
+    "friction_torque_N_m": ("N m", "power lost over the shaft's speed relative to the outer ring", _torque),
+    **{f"power_{name}_W": ("W", f"mean power lost to {text}", _mean(name)) for name, text in LOSSES.items()},
+    "land_power_W": ("W", "mean power lost in the guiding land, film and contact", _in_land),
+    "input_power_W": ("W", "mean power of shaft and outer ring", _mean("input")),
+    "eccentricity_mean": ("1", "mean eccentricity ratio", _mean("eccentricity")),
+    "eccentricity_std": ("1", "standard deviation of the eccentricity ratio over time", _deviation),
+    "eccentricity_max": ("1", "largest eccentricity ratio", _most("eccentricity")),
+    "whirl_ratio": ("1", "mean angular speed of the cage's centre about the land's, over that of the cage", _whirl),
+    "synchronous_force_x_N": ("N", "first harmonic of the pocket forces, horizontal amplitude", _first_x),
+    "synchronous_force_y_N": ("N", "first harmonic of the pocket forces, vertical amplitude", _first_y),
 }
+"""Unit, words and function of each quantity."""
 _SYMBOLS = {"cage_slip": "$s$", "eccentricity_mean": r"$\epsilon$"}
 
-
-def _quantity(name: str) -> Quantity:
-    (unit, text), of = _TEXTS[name], functools.partial(lambda name, a: _values(a)[name], name)
-    return Quantity(name, _SYMBOLS.get(name, ""), unit, text, of=of, overall="mean" if "_peak_" in name else "whole")
-
-
-QUANTITIES: tuple[Quantity, ...] = tuple(map(_quantity, _TEXTS))
+QUANTITIES: tuple[Quantity, ...] = tuple(
+    Quantity(name, _SYMBOLS.get(name, ""), unit, text, of=of, overall="mean" if "_peak_" in name else "whole")
+    for name, (unit, text, of) in _ROWS.items()
+)
 """Quantities of a whole bearing; their standard errors follow from the scatter of blocks of revolutions."""

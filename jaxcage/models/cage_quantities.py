@@ -93,41 +93,26 @@ def winding(
     return float(turned[-1] - turned[0]), int(np.sum(doubted))
 
 
-def cage_values(h: CageHistory) -> dict[str, float]:
-    """Value of each quantity of a cage; forces and displacements are those at the samples."""
-    contact, impact, away, film = h.size("contact"), h.size("impact"), h.away, h.forces["film"]
-    return {
-        "whirl_ratio": h.whirl_ratio(h.centre),
-        "rib_whirl_ratio": h.whirl_ratio(np.zeros(2)),
-        "rms": np.sqrt(h.mean(away**2)),
-        "peak_displacement": np.max(away),
-        "largest_eps": h.largest_eps,
-        "minimum_film_thickness": max(h.clearance * (1 - h.largest_eps), 0.0),
-        "velocity_scatter": h.velocity_scatter,
-        "peak_contact_force": np.max(contact),
-        "mean_contact_force": h.mean(contact),
-        "contact_impulse": h.impulse(contact),
-        "peak_impact_force": np.max(impact),
-        "impact_impulse": h.impulse(impact),
-        "drag_power": h.mean(h.drag_power),
-        "film_power": h.mean(-np.sum(film * h.velocity, axis=1)),
-    }
-
-
-CAGE_QUANTITIES = (
-    Quantity("whirl_ratio", "", "1", "whirl speed about the mean centre / cage speed"),
-    Quantity("rib_whirl_ratio", "", "1", "whirl speed about the rib centre / cage speed"),
-    Quantity("rms", "", "m", "rms displacement about the mean", "mm"),
-    Quantity("peak_displacement", "", "m", "largest displacement about the mean", "mm"),
-    Quantity("largest_eps", r"$\epsilon$", "1", "largest eccentricity ratio"),
-    Quantity("minimum_film_thickness", "", "m", "smallest film thickness", "mm"),
-    Quantity("velocity_scatter", "", "1", "scatter of the centre's speed / mean speed"),
-    Quantity("peak_contact_force", "", "N", "largest land contact force"),
-    Quantity("mean_contact_force", "", "N", "mean land contact force"),
-    Quantity("contact_impulse", "", "N s", "land contact impulse per revolution, which wear of the lands follows"),
-    Quantity("peak_impact_force", "", "N", "largest impact force"),
-    Quantity("impact_impulse", "", "N s", "impact impulse per revolution, which wear of the pockets follows (Archard)"),
-    Quantity("drag_power", "", "W", "power to shear the film"),
-    Quantity("film_power", "", "W", "power that the film takes from the centre's motion"),
-)
-"""Quantities of a cage, in the order of a table."""
+def cage_quantities(h: CageHistory) -> list[tuple[Quantity, float]]:
+    """Quantities of a cage with their values; forces and displacements are those at the samples."""
+    contact, impact, away = h.size("contact"), h.size("impact"), h.away
+    taken = -np.sum(h.forces["film"] * h.velocity, axis=1)
+    rubbing, hits = h.impulse(contact), h.impulse(impact)
+    rows = (
+        ("whirl_ratio", "1", "whirl speed about the mean centre / cage speed", h.whirl_ratio(h.centre)),
+        ("rib_whirl_ratio", "1", "whirl speed about the rib centre / cage speed", h.whirl_ratio(np.zeros(2))),
+        ("rms", "m", "rms displacement about the mean", np.sqrt(h.mean(away**2))),
+        ("peak_displacement", "m", "largest displacement about the mean", np.max(away)),
+        ("largest_eps", "1", "largest eccentricity ratio", h.largest_eps),
+        ("minimum_film_thickness", "m", "smallest film thickness", max(h.clearance * (1 - h.largest_eps), 0.0)),
+        ("velocity_scatter", "1", "scatter of the centre's speed / mean speed", h.velocity_scatter),
+        ("peak_contact_force", "N", "largest land contact force", np.max(contact)),
+        ("mean_contact_force", "N", "mean land contact force", h.mean(contact)),
+        ("contact_impulse", "N s", "land contact impulse per revolution, which wear of the lands follows", rubbing),
+        ("peak_impact_force", "N", "largest impact force", np.max(impact)),
+        ("impact_impulse", "N s", "impact impulse per revolution, which wear of the pockets follows (Archard)", hits),
+        ("drag_power", "W", "power to shear the film", h.mean(h.drag_power)),
+        ("film_power", "W", "power that the film takes from the centre's motion", h.mean(taken)),
+    )
+    symbols, shown = {"largest_eps": r"$\epsilon$"}, {"m": "mm"}
+    return [(Quantity(n, symbols.get(n, ""), unit, text, shown.get(unit, "")), float(x)) for n, unit, text, x in rows]

@@ -13,7 +13,7 @@ from .cage import CageModel
 
 
 def case(name: str) -> CageModel:
-    """Build the model of a published case, one of 1a, 1b, 2a, 2b, 3a, 3b (Table 2), with one of its two lands.
+    """Build the model of a published case, one of 1a, 1b, 2a, 2b, 3a, 3b (Table 2), with two lands.
 
     **Returns:** `CageModel`. **Raises:** `ValueError` for an unknown name, `RuntimeError` without double precision.
     """

@@ -90,7 +90,8 @@ class Traction(eqx.Module):
 
     def at(self, thickness: Scalar = 1.0) -> TractionCurve:
         """The law in oil whose viscosity is `thickness` times that for which the curve holds, its `viscosity_1`: there
-        its maximum is `peak`, exactly at `peak_speed`.
+        its maximum before smoothing is `peak`, exactly at `peak_speed`. Smoothing takes (u_s/u_m)^2/2 of it, 5e-5 by
+        default.
 
         With w = A + B u_m the slope vanishes at u_m if C = B/w, and the value there is the peak if
         w exp(A/w) = e (peak - limit), whose solution is Lambert's function.
@@ -110,7 +111,7 @@ class Traction(eqx.Module):
 
 
 def lambert_w(x: Scalar) -> Array:
-    """The upper branch of w exp(w) = x for x > -1/e. Differentiable.
+    """The upper branch of w exp(w) = x for x > -1/e. Differentiable three times.
 
     Newton's method descends to the root from log(1 + x), which is at or above it, and from 0 if x is negative.
     """
@@ -120,8 +121,8 @@ def lambert_w(x: Scalar) -> Array:
         e = jnp.exp(w)
         return w - (w * e - x) / (e * (w + 1))
 
-    root = jax.lax.fori_loop(0, 64, better, jnp.log1p(jnp.maximum(x, 0.0)))
-    return better(None, jax.lax.stop_gradient(root))  # the last step carries the derivative
+    root = jax.lax.fori_loop(0, 63, better, jnp.log1p(jnp.maximum(x, 0.0)))
+    return better(None, better(None, jax.lax.stop_gradient(root)))  # two steps carry first to third derivatives
 
 
 class Pockets(eqx.Module):
