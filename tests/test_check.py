@@ -1,15 +1,20 @@
 """The verdict for an operating range."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers import document
+from report_example import orbits, swept
 
 import jaxcage as jc
+from jaxcage.cli.orbit_commands import of_orbits
+from jaxcage.cli.subject import Subject
 from jaxcage.design import Checked, Ensemble, indices, range_chance
 from jaxcage.files import Range, Unknown
 from jaxcage.show import forces_note, indices_note, range_sentence
+from jaxcage.show.tables import number
 
 
 def ensemble(chaotic: np.ndarray, failed: np.ndarray | None = None, unknowns: int = 1) -> Ensemble:
@@ -105,3 +110,37 @@ def test_only_chaos_rattles(shares: dict[str, float], chaotic: int, begins: str,
     speeds = np.array([900.0, 990.0])
     said = range_sentence("A", Checked(speeds, 2, shares, speeds[:chaotic], speeds[:chaotic], "tsit5"))
     assert said.startswith(begins) and said.endswith(ends)
+
+
+@pytest.mark.parametrize(
+    "life, ends",
+    [
+        ([415.0], "at 1 of the speeds, 900 rpm of the cage, with a mean life of 415 revolutions"),
+        ([98.0, 461.0], "900 to 990 rpm of the cage, with a mean life of 98 to 461 revolutions"),
+        ([98.0, np.inf], "with a mean life of at least 98 revolutions"),
+        ([np.inf, np.inf], "900 to 990 rpm of the cage, and no end of it is seen"),
+        ([np.nan, np.nan], "at 2 of the speeds, 900 to 990 rpm of the cage"),
+    ],
+)
+def test_ranges_of_one_value_are_one_number(life: list[float], ends: str):
+    speeds = np.array([900.0, 990.0])
+    shares = {"chaotic": 0.5, "periodic-1": 0.5}
+    assert str(Checked(speeds, 2, shares, speeds[: len(life)], np.array(life), "tsit5")).endswith(ends)
+
+
+def test_what_is_rounded_to_zero_has_no_sign():
+    assert [number(-4e-7, digits=6), number(-0.004, 0.3), number(-0.04, 0.3)] == [
+        "0.000000",
+        "0.00 ± 0.30",
+        "-0.04 ± 0.30",
+    ]
+
+
+def test_narrow_ranges_do_not_count_where_an_orbit_is_said_to_be_stable():
+    """Between 14000 and 14300 rpm there is no stable orbit, which is no unstable range of the answer."""
+    found = orbits(sweep := swept())
+    low, high = found.stretches
+    parts = dataclasses.replace(high, upper_rpm=14e3), dataclasses.replace(high, lower_rpm=14.3e3)
+    found = dataclasses.replace(found, stretches=(low, *parts), sweep=sweep)
+    said = of_orbits(Subject("1a", jc.case("1a")), found, jc.unstable_ranges(found)).sentence
+    assert "except 7000 to 12000 rpm, from 20000 rpm on (ranges narrower than 500 rpm do not count)." in said

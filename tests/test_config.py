@@ -61,6 +61,8 @@ def test_units(text: str, unit: str, value: float):
     ("nan", "m", "not a number with a unit"),
     ("__import__('os')", "m", "not a number with a unit"),
     ("1 2 mm", "m", "unknown unit"),
+    ("2 1 mm", "m", 'unknown unit "1 mm"'),
+    ("2 1", "1", 'unknown unit "1"'),
     ("60 C", "K", 'has the unit "C", where a unit like "degC" is wanted'),
     ("0,45 mm", "m", 'is "0,45 mm": numbers are written with a point and without commas'),
     ("1,450 N", "N", "with a point and without commas"),

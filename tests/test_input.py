@@ -12,6 +12,7 @@ import pytest
 
 import jaxcage as jc
 from jaxcage.bearing import PUBLISHED_CASES, catalogue, line_contact_stiffness, listed
+from jaxcage.cli.subject import read_case
 from jaxcage.files import ConfigError, configuration, declarations, load_model, model_from, read_bearing, template
 from jaxcage.files.schema import schema
 
@@ -41,6 +42,7 @@ WRONG = {
     "lubricant.temperature = 55": '200 to 600 K, but is 55 K; with its unit it is written "55 degC".',
     'cage_mass = "3 t"': 'from 0.001 to 100 kg, but is 3000 kg (given as "3 t").',
     'eccentricity = "G6.3"': 'speed of its balance grade, such as "G6.3 at 12000 rpm shaft", but is "G6.3".',
+    'eccentricity = "G-4 at 900 rpm"': 'grade, such as "G6.3 at 12000 rpm shaft", but is "G-4 at 900 rpm".',
     'eccentricity = "G6.3 at 200 Hz shaft"': 'such as "G6.3 at 12000 rpm shaft", but is in Hz',
     'guidance = "inner"': 'Key `guidance` at the top level needs model = "bearing".',
     'bearing.designation = "6204"': "`bearing.designation` must be one of NU1010, NU1014,",
@@ -57,6 +59,13 @@ for path in sys.argv[1:]:
     print(main(["statics", path]), file=sys.stderr)
 print(sorted({"jax", "equinox"} & set(sys.modules)), file=sys.stderr)
 """
+OF_ANOTHER_KIND = {
+    "poincare nu2310 --speed 9000": "Command poincare takes a cage, but nu2310 is a bearing with its rollers.",
+    "simulate 1a --speed 9000 --load 3": "Option --load goes with a bearing with its rollers, but 1a is a cage.",
+    "gradient 1a --load 3": "Option --load goes with a bearing with its rollers, but 1a is a cage.",
+    "compare 1a nu2310": "Case 'nu2310' must be a cage, as the first one is: two of a kind are compared.",
+    "identify 1a none.csv": 'with ranges, such as stiffness = "1e4 .. 1e6 N/m", but has none.',
+}
 
 
 def test_wrong_files_are_refused_before_jax_is_loaded(tmp_path: Path):
@@ -70,6 +79,19 @@ def test_wrong_files_are_refused_before_jax_is_loaded(tmp_path: Path):
         assert ends in said and said.startswith("File '")
     assert "none.toml' must be a readable TOML file, but: No such file or directory." in found[-5]
     assert found[-3].startswith("Case '1c' is unknown: it must be one of 1a,")
+
+
+def test_cases_of_the_wrong_kind_are_refused_before_jax_is_loaded():
+    script = REFUSALS.replace('["statics", path]', "path.split()")
+    command = [sys.executable, "-c", script, *OF_ANOTHER_KIND]
+    found = subprocess.run(command, capture_output=True, text=True, check=True).stderr.splitlines()
+    assert found[-1] == "[]" and found[1:-1:2] == ["2"] * len(OF_ANOTHER_KIND)
+    assert all(said.endswith(ends) for said, ends in zip(found[:-1:2], OF_ANOTHER_KIND.values(), strict=True))
+
+
+def test_a_long_name_of_a_file_leaves_room_for_names_of_output_files(tmp_path: Path):
+    (path := tmp_path / f"{'n' * 240}.toml").write_text('base = "1a"\n')
+    assert read_case(str(path)).name == "n" * 50
 
 
 @pytest.mark.parametrize(

@@ -244,9 +244,6 @@ def identify(
         draws: Number of draws from the ranges in each stage.
     """
     model, unknowns = subject.model, subject.unknowns
-    if not unknowns:
-        example = 'such as stiffness = "1e4 .. 1e6 N/m"'
-        raise InputError(f"Case {subject.name} must be a TOML file with ranges, {example}, but has none.")
     rows = jc.files.read_measurements(measured, subject.speeds, 1 / (subject.shaft or 1.0))
     told = {"method": steps.method, "progress": partial(report, "draws")}
     missed = lambda place: jc.design.misses(model, unknowns, rows, place, **told)

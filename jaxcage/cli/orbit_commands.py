@@ -87,7 +87,6 @@ def bifurcations(
     Args:
         discard: Revolutions of the simulations that are discarded at the beginning.
     """
-    subject.require_orbits("bifurcations")
     return of_orbits(subject, *_searched(subject, over, discard, steps.method))
 
 
@@ -106,16 +105,14 @@ def of_orbits(subject: Subject, found: Any, loss: Any) -> Answer:
         jc.show.stretch_table(name, found, beside),
         jc.show.edge_table(found, loss, beside),
     ]
-    notes = [
-        *jc.show.coexisting_notes(loss),
-        *jc.show.unsettled_notes(found),
-    ]
+    notes = [*jc.show.coexisting_notes(loss), *jc.show.unsettled_notes(found)]
     if further := len(found.points) - len(found.edges):
         notes.append(f"Further bifurcations, on unstable parts: {further} (listed by --json)")
     if found.missed:
         notes.append(f"Settled orbits that are on no branch: {found.missed}")
     without, count = ", ".join(jc.show.zone_words(zone, beside) for zone in loss.zones), len(found.stretches)
-    said = f"A synchronous orbit is stable at every speed{f' except {without}' if without else ''}."
+    said = f"A synchronous orbit is stable at every speed{f' except {without}' if without else ''}"
+    said += f" (ranges narrower than {loss.close_below_rpm:.0f} rpm do not count)."
     said = said if count else "No synchronous orbit that was found is stable."
     said += f" It is in {count} pieces; at the end of one the cage goes over to another motion." if count > 1 else ""
     document = {"points": [jc.show.point_record(p, found) for p in found.points], "missed": found.missed}

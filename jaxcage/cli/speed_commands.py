@@ -146,13 +146,10 @@ def swept(subject: Subject, speeds: Any, run: o.RunOptions, out: str | None = No
     if names := [n for n in SHOWN if n in found]:
         tables.append(jc.show.quantities_table(f"Means over initial states, {title}", found, [*names, "exponent"]))
     document = {name: found.attrs[name] for name in ("discard", "revolutions", "horizon")}
-    document |= {
-        "speeds": found.sizes["speed"],
-        "initial_states": found.sizes["initial_state"],
-        "labels": counted(found),
-    }
-    document |= {"failed": jc.analysis.outcomes(found), "confirmed": json.loads(found.attrs["confirmed"])}
-    document |= {"too_short": short, "error": float(np.nanmax(found["error"].values))}
+    document |= {"speeds": found.sizes["speed"], "initial_states": found.sizes["initial_state"]}
+    document |= {"labels": counted(found), "failed": jc.analysis.outcomes(found)}
+    document |= {"confirmed": json.loads(found.attrs["confirmed"]), "too_short": short}
+    document |= {"error": float(np.nanmax(found["error"].values))}
     files = {"figure": jc.show.sweep_figure(found, zones, subject.published, title), "data": found}
     said, notes = said_of(subject, found, zones), zone_notes(subject, zones)
     return found, Answer(said, tables, notes, document, files, details=[jc.summary(found)], kept=kept)
@@ -201,7 +198,6 @@ def poincare(
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
     """Strobe section at one speed, from all initial states."""
-    subject.require_orbits("poincare")
     at = subject.speed(speed)
     settings: dict[str, Any] = run.settings | {"keep": run.revolutions, "progress": partial(report, "sweep")}
     found = jc.sweep(subject.model, np.array([at]), **settings)
@@ -229,9 +225,6 @@ def compare(
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
     """Two designs side by side at the same speeds of the shaft: differences, labels, zones, forces, wear."""
-    if subject.with_rollers != other.with_rollers:
-        kind = subject.usual("a cage", "a bearing with its rollers")
-        raise InputError(f"Case '{other.name}' must be {kind}, as the first one is: two of a kind are compared.")
     second = dataclasses.replace(other, name=f"{other.name}_second") if other.name == subject.name else other
     pair, times = (subject, second), 1.0 if subject.shaft is None else subject.shaft / (second.shaft or 1.0)
     names, speeds = [each.name for each in pair], subject.range(over, subject.usual(126, 13))

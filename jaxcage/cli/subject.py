@@ -18,9 +18,11 @@ from .progress import say
 
 if TYPE_CHECKING:
     from ..bearing import PublishedCase
-    from ..files import BearingFile, Unknown
+    from ..files import BearingFile, Description, Unknown
 
 RPM = 30 / math.pi
+LONGEST = 50
+"""Characters of the name of a TOML file that names of output files and titles repeat; systems allow 255 bytes."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,12 +141,7 @@ class Subject:
         return float(low), float(high)
 
     def under(self, load: float | None) -> "Subject":
-        """The bearing under a load [N]; itself without one.
-
-        **Raises:** `InputError` for a cage, whose forces do not follow from the load.
-        """
-        if load is not None and not self.with_rollers:
-            raise InputError(f"Option --load goes with a bearing with its rollers, but {self.name} is a cage.")
+        """The bearing under a load [N]; itself without one."""
         return self if load is None else dataclasses.replace(self, model=jc.replace(self.model, load=load))
 
     def operating(self, given: tuple[float, ...]) -> tuple["Subject", tuple[float, float]]:
@@ -152,11 +149,6 @@ class Subject:
         of the range as speeds of the model [rad/s]."""
         low, high = (jc.rpm(self.rpm(end, "operating")) for end in given)
         return dataclasses.replace(self, bare=getattr(given[0], "whose", self.speeds)), (low, high)
-
-    def require_orbits(self, command: str) -> None:
-        """**Raises:** `InputError` for a model whose revolutions do not repeat."""
-        if self.with_rollers:
-            raise InputError(f"Command {command} takes a cage, but {self.name} is a bearing with its rollers.")
 
     def about(self, by_ranges: bool) -> tuple[dict[str, Any], list[str]]:
         """Entries of the case in every document, and sentences about it; best guesses only where these were taken."""
@@ -183,8 +175,10 @@ def _is_file(given: str) -> bool:
     return Path(given).suffix.lower() == ".toml" or os.path.exists(given)
 
 
-def check_case(given: str, speeds: dict[str, float | None]) -> None:
+def check_case(given: str, speeds: dict[str, float | None]) -> "Description":
     """Check the name of a case, or the keys and values of a TOML file, and speeds by option, without loading JAX.
+
+    **Returns:** what is described.
 
     **Raises:** `InputError`.
     """
@@ -198,12 +192,13 @@ def check_case(given: str, speeds: dict[str, float | None]) -> None:
     found = describe({"base": given.lower()}) if listed else read_description(given)
     n = found.numbers
     if n.get("guidance") == "inner" or "outer_speed" in n:  # `Subject.rpm` knows them
-        return
+        return found
     for option, speed in speeds.items():
         if speed is not None:
             whose = getattr(speed, "whose", found.speeds)
             ratio = 1.0 if whose == "cage" else cage_speed_ratio(n["inner_raceway_diameter"], n["roller_diameter"])
             require_cage_rpm(flag(option), speed * ratio, land_radius(n["rib_diameter"], n["guidance_gap"]))
+    return found
 
 
 def read_case(given: str) -> Subject:
@@ -220,7 +215,7 @@ def read_case(given: str) -> Subject:
         found = Subject(given.lower(), jc.whole_bearing(given))
     else:
         file, name = jc.files.read_bearing(given), Path(given).stem
-        name = "".join(c if c.isprintable() and c != "$" else "_" for c in name)
+        name = "".join(c if c.isprintable() and c != "$" else "_" for c in name[:LONGEST])
         found = Subject(name, file.model, None, file, given)
     if broken := jc.bearing.design_rule_violations(found.model.bearing, found.model.guidance_gap):
         estimated = () if found.file is None else found.file.estimated

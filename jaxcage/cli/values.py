@@ -37,18 +37,18 @@ def read_vary(given: Sequence[str], subject: Subject) -> dict[str, Any]:
 
 def read_bounds(given: Sequence[str], subject: Subject) -> dict[str, tuple[float, float]]:
     """Read every `NAME=LOWER:UPPER` in SI units; the usual ones if nothing is given. **Raises:** `InputError`."""
-    model, names = subject.model, subject.usual((), jc.design.CAGE_PARAMETERS)
+    model, names = subject.model, subject.usual(jc.parameter_info(subject.model), jc.design.CAGE_PARAMETERS)
     if not given:
         usual, now = USUAL | subject.usual({}, WITH_ROLLERS), jc.parameters(model)
         found = {name: (low * float(now[name]), high * float(now[name])) for name, (low, high) in usual.items()}
         return {name: bounds for name, bounds in found.items() if bounds[0] > 0}
 
     def read(name: str, text: str) -> Any:
-        between = None if name in (SPEED, OIL) else _read(name, text, subject)
+        if name not in names:
+            raise InputError(f"Option --vary must name one of {', '.join(names)}, but names '{name}'.")
+        between = _read(name, text, subject)
         if not isinstance(between, jc.files.Range) or between.is_normal:
             raise ValueError(f"must be a parameter's NAME=LOWER:UPPER, but is {text}.")
-        if names and name not in names:
-            raise InputError(f"Option --vary must name one of {', '.join(names)}, but names '{name}'.")
         return between
 
     found = _read_each("--vary", given, "a parameter's NAME=LOWER:UPPER", read)

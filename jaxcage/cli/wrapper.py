@@ -13,7 +13,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from .._cache import keep_compiled_programs
@@ -37,6 +37,9 @@ from .progress import (
 )
 from .subject import check_case, read_case
 
+
+if TYPE_CHECKING:
+    from ..files import Description
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
@@ -96,9 +99,8 @@ def _run(call: functools.partial[Answer]) -> None:
     operating = call.keywords.get("operating") or getattr(call.keywords.get("calm"), "operating", None)
     if operating is not None:
         speeds["operating"] = operating[1]
-    check_case(call.keywords["subject"], speeds)
-    if "other" in call.keywords:
-        check_case(call.keywords["other"], {})
+    found = check_case(call.keywords["subject"], speeds)
+    _check_kind(call, found, check_case(call.keywords["other"], {}) if "other" in call.keywords else found)
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells where it stores fonts if there is no home folder
     import jax
 
@@ -129,9 +131,7 @@ def _of_a_case(call: functools.partial[Answer], show: ShowOptions) -> Answer:
 
     began, command, given = time.perf_counter(), call.func.__name__.rstrip("_"), call.keywords
     cases = {name: read_case(given[name]) for name in ("subject", "other") if name in given}
-    if call.func is not case.statics:  # which takes the load of a cage, too
-        load = given["means"].load if "means" in given else given.get("load")
-        cases["subject"] = cases["subject"].under(load)
+    cases["subject"] = cases["subject"].under(_load(call))
     check_writable(show.out)
     with progress(f"{command} {cases['subject'].name}"):
         answer = call(**cases)
@@ -142,6 +142,27 @@ def _of_a_case(call: functools.partial[Answer], show: ShowOptions) -> Answer:
     if answer.kept and not interrupted():
         shutil.rmtree(answer.kept)
     return answer
+
+
+def _load(call: functools.partial[Answer]) -> float | None:
+    """Load of a bearing with its rollers, if it is given; the one of `statics` is that of a cage, too."""
+    given = call.keywords
+    return None if call.func is case.statics else given["means"].load if "means" in given else given.get("load")
+
+
+def _check_kind(call: functools.partial[Answer], found: "Description", other: "Description") -> None:
+    """Check that a command and its options are for such a case, and two cases of one kind. **Raises:** `InputError`."""
+    command, name, is_cage = call.func.__name__, call.keywords["subject"], found.subject == "cage"
+    if not is_cage and call.func in (orbit.bifurcations, speed.poincare):  # the revolutions of a bearing do not repeat
+        raise InputError(f"Command {command} takes a cage, but {name} is a bearing with its rollers.")
+    if is_cage and _load(call) is not None:  # from which the forces on a cage do not follow
+        raise InputError(f"Option --load goes with a bearing with its rollers, but {name} is a cage.")
+    if found.subject != other.subject:
+        kind, second = "a cage" if is_cage else "a bearing with its rollers", call.keywords["other"]
+        raise InputError(f"Case '{second}' must be {kind}, as the first one is: two of a kind are compared.")
+    if call.func is design.identify and not found.ranges:
+        example = 'such as stiffness = "1e4 .. 1e6 N/m"'
+        raise InputError(f"Case {name} must be a TOML file with ranges, {example}, but has none.")
 
 
 def _about_options(error: ArgumentError, call: functools.partial[Answer]) -> Exception:

@@ -153,12 +153,15 @@ class Checked:
         said = f"{share:.1f} % of {self.initial_states} initial states at {self.speeds_rpm.size} speeds end calm"
         if not self.chaotic_rpm.size:
             return said
-        low, high = f"{self.chaotic_rpm.min():.0f}", f"{self.chaotic_rpm.max():.0f} rpm of the cage"
-        ends = self.mean_life.min(), self.mean_life.max()
-        lasts = " to ".join(f"{x:.0f}" if np.isfinite(x) else "no end seen" for x in ends)
-        where = f"at {self.chaotic_rpm.size} of the speeds, {low} to {high}"
-        said = f"{said}; chaos coexists {where}"
-        return said if np.isnan(ends[0]) else f"{said}, with a mean life of {lasts} revolutions"
+        each = lambda x: " to ".join(dict.fromkeys(f"{end:.0f}" for end in (x.min(), x.max())))
+        where = f"at {self.chaotic_rpm.size} of the speeds, {each(self.chaotic_rpm)} rpm of the cage"
+        said, life = f"{said}; chaos coexists {where}", self.mean_life
+        if np.isnan(life).any():
+            return said
+        if np.isinf(life).all():
+            return f"{said}, and no end of it is seen"
+        lasts = f"at least {life.min():.0f}" if np.isinf(life).any() else each(life)
+        return f"{said}, with a mean life of {lasts} revolutions"
 
 
 def check_design(

@@ -287,7 +287,7 @@ def _value(name: str, value: Any, declared: Mapping[str, Any], speeds: Whose) ->
 
 
 def _balance(text: str, grade: float, at: str | None, speeds: Whose) -> Balance:
-    must = f'`eccentricity` must name the speed of its balance grade, such as "G{grade:g} at 12000 rpm shaft"'
+    must = '`eccentricity` must name the speed of its balance grade, such as "G6.3 at 12000 rpm shaft"'
     try:
         speed = read_rpm(at) if at else 0.0
     except ValueError as error:

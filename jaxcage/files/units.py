@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 _SIZE = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 NUMBER = rf"[-+]?{_SIZE}"
 _NUMBER_AND_UNIT = re.compile(rf"\s*({NUMBER})\s*(.*?)\s*")
-_UNIT = re.compile(r"[\w°µΩ%*/^().·⁻ +-]{1,60}")
-"""Characters of a unit; pint ignores a comment, a colon or a line end."""
+_UNIT = re.compile(r"(?!\d(?!\s*/))[\w°µΩ%*/^().·⁻ +-]{1,60}")
+"""Characters of a unit; pint ignores a comment, a colon or a line end, and the second number in "2 1 mm"."""
 _COMMA = re.compile(r"\s*[-+]?\d*,\d")
 _DASH = re.compile(rf"\s*{_SIZE}(?:\s+[^\s\d]+)?\s+(?:-|–|to)\s+{_SIZE}")
 """Two numbers with a dash between them."""

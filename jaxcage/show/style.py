@@ -19,7 +19,7 @@ BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
 SKY, PURPLE, BLACK, GREY = "#56B4E9", "#CC79A7", "#222222", "#8A8A8A"
 ZONE = "#F8EBC8"
 """Light amber behind chaotic zones, on which points keep their contrast."""
-GRID, BAND, PAPER = "#E6E6E6", "#F5F5F5", "#FFFFFF"
+GRID, PAPER = "#E6E6E6", "#FFFFFF"
 RASTER_DPI = 200
 
 KIND_COLOURS = {

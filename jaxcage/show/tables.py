@@ -34,14 +34,15 @@ def factor(unit: str, shown: str) -> float:
 
 
 def number(value: float, error: float | None = None, digits: int | None = None) -> str:
-    """A number as text: with the digits of its error, with given digits, or with four significant ones."""
+    """A number as text: with the digits of its error, with given digits, or with four significant ones; what is rounded
+    to zero has no sign."""
     if not math.isfinite(value):
         return NOTHING
     if error is not None and math.isfinite(error) and error > 0:
         places = digits if digits is not None else max(0, 1 - math.floor(math.log10(error)))
-        return f"{value:.{places}f} ± {error:.{places}f}"
+        return f"{value:z.{places}f} ± {error:.{places}f}"
     if digits is not None:
-        return f"{value:.{digits}f}"
+        return f"{value:z.{digits}f}"
     if value == 0 or 1e-3 <= abs(value) < 1e6:
         return f"{value:.{max(3 - math.floor(math.log10(abs(value) or 1.0)), 0)}f}"
     return f"{value:.3e}"
