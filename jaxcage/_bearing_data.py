@@ -7,6 +7,7 @@ import csv
 import functools
 import importlib.resources
 import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ._errors import ArgumentError, InputError
@@ -53,6 +54,22 @@ DIMENSIONS |= {"rib_diameter": "D1", "inner_raceway_diameter": "F"}
 def dimensions(designation: str) -> dict[str, float]:
     """Parameters [m] that stand in the catalogue."""
     return {name: 1e-3 * float(rows()[designation][column]) for name, column in DIMENSIONS.items()}
+
+
+NORMAL_CLEARANCE = {24: 32.5, 30: 32.5, 40: 37.5, 50: 45.0, 65: 55.0, 80: 57.5, 100: 67.5, 120: 70.0}
+"""Largest bore [mm] -> middle of the normal radial clearance of cylindrical roller bearings [um]; ISO 5753-1."""
+POCKET = 0.3 / 16
+"""Pocket clearance over roller diameter where none is known: that of the paper's bearing."""
+
+
+def clearances(sizes: Mapping[str, float]) -> dict[str, float]:
+    """Estimates of clearances [m] from bore and roller diameter; the radial one needs a bore of at most 120 mm."""
+    found = {}
+    if normal := [um for most, um in NORMAL_CLEARANCE.items() if sizes.get("bore", math.inf) <= 1e-3 * most]:
+        found["radial_clearance"] = 1e-6 * normal[0]
+    if "roller_diameter" in sizes:
+        found["pocket_clearance"] = POCKET * sizes["roller_diameter"]
+    return found
 
 
 def estimated(designation: str) -> tuple[str, ...]:

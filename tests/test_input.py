@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import shlex
 import subprocess
 import sys
@@ -153,10 +154,26 @@ def test_what_is_estimated_of_a_catalogue_bearing_is_named(tmp_path: Path):
     assert file.estimated == tuple(f"bearing.{name}" for name in names)
     rows = jc.show.sources_table(file.model, file).records
     found = {row["name"].removeprefix("bearing."): row["from"] for row in rows if row["name"].startswith("bearing.")}
-    assert {name for name, source in found.items() if source == "estimated for the catalogue"} == {*names}
+    assert {name for name, source in found.items() if source == "estimated from dimensions"} == {*names}
     assert (found["bore"], found["pocket_clearance"]) == ("catalogue, NU1020", "this file")
     path.write_text('base = "1a"\n[bearing]\ndesignation = "NU2310"')
     assert read_bearing(path).estimated == ()
+
+
+def test_clearances_that_dimensions_leave_out_are_estimated(tmp_path: Path):
+    path, text = tmp_path / "mine.toml", template()
+    text = re.sub(r"(?m)^(radial|pocket)_clearance = .*$", "", text)
+    path.write_text(text)
+    file = read_bearing(path)
+    assert file.estimated == ("bearing.radial_clearance", "bearing.pocket_clearance")
+    bearing = listed("NU2210").bearing  # of the same bore; 0.3 mm is the pocket clearance of the paper's rollers
+    assert float(file.model.bearing.radial_clearance) == float(bearing.radial_clearance)
+    assert float(file.model.bearing.pocket_clearance) == pytest.approx(0.3e-3)
+    rows = {row["name"]: row["from"] for row in jc.show.sources_table(file.model, file).records}
+    assert rows["bearing.radial_clearance"] == "estimated from dimensions"
+    path.write_text(text.replace('bore = "50 mm"', 'bore = "130 mm"'))
+    with pytest.raises(ConfigError, match="`bearing.radial_clearance` must be given"):
+        read_bearing(path)
 
 
 @pytest.mark.parametrize("name", ["NU1014", "NU2210"])

@@ -73,7 +73,7 @@ def test_toml_of_the_pages_is_accepted(tmp_path: pathlib.Path):
     from jaxcage.files import load_model
 
     blocks = re.findall(r"```toml\n(.*?)```", "\n".join(PAGES.values()), flags=re.S)
-    cage, whole = sorted(blocks, key=lambda block: "nu2310" in block)
+    cage, whole, dimensions = sorted(blocks, key=lambda block: ("bore" in block, "nu2310" in block))
     path = tmp_path / "bearing.toml"
     path.write_text(whole)
     assert float(load_model(path).load) == 1000.0
@@ -81,6 +81,9 @@ def test_toml_of_the_pages_is_accepted(tmp_path: pathlib.Path):
     model = load_model(path)
     assert float(model.guidance_gap) == pytest.approx(0.5e-3)
     assert float(model.lubricant.temperature) == pytest.approx(343.15)
+    short = ROOT / "jaxcage" / "files" / "short_template.toml"
+    path.write_text(short.read_text().replace('[bearing]\ndesignation = "NU2310"', dimensions))
+    assert load_model(path).bearing.n_rollers == 13 and 'designation = "' not in path.read_text()
 
 
 @pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", *(f"docs/{name}.md" for name in PAGES)])

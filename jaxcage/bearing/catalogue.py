@@ -9,15 +9,11 @@ import dataclasses
 import functools
 from typing import Any, NamedTuple
 
-from .._bearing_data import designated, dimensions, estimated, rows
+from .._bearing_data import clearances, designated, dimensions, estimated, rows
 from .._errors import ArgumentError
 from .geometry import Bearing
 
 
-NORMAL_CLEARANCE = {24: 32.5, 30: 32.5, 40: 37.5, 50: 45.0, 65: 55.0, 80: 57.5, 100: 67.5, 120: 70.0}
-"""Largest bore [mm] -> middle of the normal radial clearance of cylindrical roller bearings [um]; ISO 5753-1."""
-POCKET = 0.3 / 16
-"""Pocket clearance over roller diameter where none is known: that of the paper's bearing."""
 CHAMFERS = 1.5e-3
 """Total less effective length of a roller [m]: with 1.2 mm (small ones) to 1.7 mm ISO 76 gives the printed ratings."""
 
@@ -59,12 +55,10 @@ def _listed(row: dict[str, str]) -> Listed:
     number = lambda name: float(row[name] or "nan")
     name = row["designation"]
     sizes: dict[str, Any] = dimensions(name)
-    clearance = next(middle for bore, middle in NORMAL_CLEARANCE.items() if number("d") <= bore)
     bearing = Bearing(
         **sizes,
         n_rollers=int(row["Z"]),
-        radial_clearance=1e-6 * clearance,
-        pocket_clearance=POCKET * sizes["roller_diameter"],
+        **clearances(sizes),
         effective_length=sizes["roller_length"] - CHAMFERS,
     )
     ratings = 1e3 * number("C"), 1e3 * number("C0")

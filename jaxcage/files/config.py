@@ -60,7 +60,7 @@ class BearingFile:
     left: tuple[str, ...]
     """Dotted names of values on lines that are still as `jaxcage init` wrote them."""
     estimated: tuple[str, ...]
-    """Dotted names of values that the file does not give, estimated for the catalogue or from the cage material."""
+    """Dotted names of values that the file does not give, estimated from dimensions or from the cage material."""
     material: CageMaterial | None
     """Material of the cage, if it is named."""
     table: Mapping[str, Any]

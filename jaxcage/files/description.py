@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from .._allowed import ParameterInfo, allowed as must_be, must_be_given, within
-from .._bearing_data import CageMaterial, cage_material, cage_speed_ratio, designated, estimated
+from .._bearing_data import CageMaterial, cage_material, cage_speed_ratio, clearances, designated, estimated
 from .._errors import ConfigError
 from .disk import read_bytes
 from .plausibility import check_numbers
@@ -92,7 +92,7 @@ class Description:
     ranges: Ranges
     table: Mapping[str, Any]
     estimated: tuple[str, ...]
-    """Dotted names of values that the file does not give, estimated for the catalogue or from the cage material."""
+    """Dotted names of values that the file does not give, estimated from dimensions or from the cage material."""
     material: CageMaterial | None = None
     """Material of the cage, if it is named."""
     left: tuple[str, ...] = ()
@@ -156,8 +156,10 @@ def describe(table: Mapping[str, Any]) -> Description:
     if base is None and root.values.get("guidance") == "inner" and "inner_land_diameter" not in rest:
         raise ConfigError('`inner_land_diameter` must be given with guidance = "inner".')
     bearing = root.parts.get("bearing")
-    listed = () if bearing is None or bearing.ready_made is None else estimated(bearing.ready_made[1])
-    guessed = tuple(f"bearing.{name}" for name in listed if name not in rest["bearing"])
+    guessed: tuple[str, ...] = ()
+    if bearing is not None:
+        names = bearing.values if bearing.ready_made is None else estimated(bearing.ready_made[1])
+        guessed = tuple(f"bearing.{name}" for name in names if name not in rest["bearing"])
     guessed += tuple(where for name, where in made.items() if name not in {**rest, **rest.get("pockets", {})})
     found = Description(subject, base, speeds, root, ranges, table, guessed, material)
     if isinstance(given := root.values.get("eccentricity"), Balance):
@@ -215,6 +217,7 @@ def _checked(
         below = {key: value for key, value in below.items() if key != "kind" or len(options) == 1}
         parts[name] = _checked(kind, below, started and kind == options[0], (*path, name), ranges, speeds, made)
     if not started:
+        found = clearances(found) | found if module == "Bearing" else found
         _require_whole(module, {*found, *parts, *made}, path)
     return Part(module, found, parts, ready_made)
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .._allowed import SOURCES
-from .._bearing_data import designated, estimated
 from .._parameters import EXTRA, get, parameter_paths, readings_of, walk
 from ..files import BearingFile, configuration, is_range
 from ..models import AbstractForcedSystem
@@ -54,6 +53,8 @@ def sources_table(model: AbstractForcedSystem, file: BearingFile | None) -> Tabl
                 between = " to ".join(f"{shown(end, info.unit, unit)[1]:.4g}" for end in (known.lower, known.upper))
         if {name, name.removesuffix("_x").removesuffix("_y")} & set(left):
             source = "not confirmed: as `jaxcage init` wrote it"
+        elif file and name in file.estimated and first == "bearing":
+            source = "estimated from dimensions"
         elif first == EXTRA:
             source = "a force of your own"
         else:
@@ -103,8 +104,6 @@ def _in_file(path: tuple[str, ...], table: Mapping[str, Any], given: Any) -> str
     part = table.get(path[0])
     for (made, key), words in READY_MADE.items():
         if path[0] == made and isinstance(part, Mapping) and key in part:
-            if key == "designation" and path[-1] in estimated(designated(part[key])):
-                return "estimated for the catalogue"
             return "default" if path[1:] == ("temperature",) else words.format(part[key])
     replaced = isinstance(part, Mapping) and "kind" in part  # by another law than that of the base
     return f"case {table['base']}" if "base" in table and not replaced else "default"
