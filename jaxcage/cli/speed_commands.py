@@ -229,7 +229,7 @@ def compare(
     pair, times = (subject, second), 1.0 if subject.shaft is None else subject.shaft / (second.shaft or 1.0)
     names, speeds = [each.name for each in pair], subject.range(over, subject.usual(126, 13))
     second.rpm(speeds[-1] * times * RPM, "last", second.own)
-    found, means, said, tables, designs = [], [], [], [], {}
+    found, said, tables, designs = [], [], [], {}
     for each, factor in zip(pair, (1.0, times), strict=True):
         data = jc.sweep(each.model, speeds * factor, **run.settings, progress=partial(report, each.name))
         jc.show.require_some(data, f" of {each.name}")
@@ -237,16 +237,15 @@ def compare(
         own = {n: jc.show.mean_over_starts(data, n) for n in COMPARED if n == "exponent" or n in data}
         designs[each.name] = each.both(data["speed"].values) | {n: mean for n, (mean, _) in own.items()}
         designs[each.name] |= {f"{n}_error": error for n, (_, error) in own.items()}
-        means.append({n: float(np.nanmean(mean)) for n, (mean, _) in own.items()})
         said.append(f"{each.name}: {said_of(each, data, zones_of(data))}")
         tables += jc.show.motion_tables(each.name, zones_of(data), each.beside)
-    rows = [{"measure": n.replace("_", " "), **{x: m[n] for x, m in zip(names, means, strict=True)}} for n in means[0]]
+    compared = [n for n in COMPARED if n in designs[names[0]]]
     tables = [
-        jc.show.table("Means over speed, in SI units", rows, ["measure", *names], "means"),
+        jc.show.means_table(names, found, compared),
         jc.show.differences_table(names, [each.model for each in pair]),
         *(dataclasses.replace(table, key="") for table in tables),
     ]
-    files = {"figure": jc.show.quantities_beside(names, found, list(means[0]), title=" and ".join(names))}
+    files = {"figure": jc.show.quantities_beside(names, found, compared, title=" and ".join(names))}
     return Answer(" ".join(said), tables, [], {"cases": names, "designs": designs}, files, part=f"_{names[1]}")
 
 

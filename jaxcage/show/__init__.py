@@ -83,6 +83,7 @@ from .parameter_tables import (
 from .quantity_tables import (
     displacements as displacements,
     mean_over_starts as mean_over_starts,
+    means_table as means_table,
     quantities_table as quantities_table,
     quantity_words as quantity_words,
     run_tables as run_tables,

@@ -68,6 +68,16 @@ def quantities_table(title: str, found: xr.Dataset, names: Sequence[str]) -> Tab
     return table(title, rows, columns, "means")
 
 
+def means_table(designs: Sequence[str], found: Sequence[xr.Dataset], names: Sequence[str]) -> Table:
+    """Table of means over speed of quantities of several designs, side by side."""
+    rows = []
+    for name in names:
+        means = [float(np.nanmean(mean_over_starts(data, name)[0])) for data in found]
+        column = column_of(found[0], name)
+        rows.append({"measure": column.head, "unit": column.unit, **dict(zip(designs, means, strict=True))})
+    return table("Means over speed", rows, ["measure", UNIT, *(Column(name, unit=OWN) for name in designs)], "means")
+
+
 def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Table]:
     """Tables of quantities of one run with standard errors, and of spectral lines with the bearing's frequencies."""
     words = lambda q: q.text if len(q.text) <= LONGEST else head_of(q.name, q.unit)
