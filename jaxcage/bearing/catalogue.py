@@ -55,10 +55,10 @@ def _listed(row: dict[str, str]) -> Listed:
     number = lambda name: float(row[name] or "nan")
     name = row["designation"]
     sizes: dict[str, Any] = dimensions(name)
+    sizes |= clearances(sizes)
     bearing = Bearing(
         **sizes,
         n_rollers=int(row["Z"]),
-        **clearances(sizes),
         effective_length=sizes["roller_length"] - CHAMFERS,
     )
     ratings = 1e3 * number("C"), 1e3 * number("C0")
