@@ -199,7 +199,7 @@ def page(lines: list[list[str]], notes: list[str]) -> str:
             f"SciPy's derivatives are central difference quotients over {shooting.DISTANCE:g}.",
             "AUTO does not report the period doubling of the cage: within one of its steps a complex pair of",
             "multipliers becomes real and one of them passes -1, while its test function, the distance of the nearest",
-            "multiplier from the unit circle, keeps its sign.",
+            "multiplier from the unit circle, keeps its sign. `off` leaves that point out.",
             "",
             *("| " + " | ".join(cells) + " |" for cells in table),
             "",
