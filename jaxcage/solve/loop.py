@@ -24,9 +24,8 @@ def march_ir(field: Field, pair: str, width: int) -> str:
 
     `march(queue, lanes, revolutions, keep, settings, shared, loaded, stored, strobe, growth)`: queue holds the next
     lane, a stop flag, and the number of strobe states reached; settings are tolerance, largest step, smallest step;
-    loaded and stored have a row of all lanes for each of the first rows of
-    `layout_of`; strobe is (lanes, keep, recorded), a ring buffer; growth is (lanes, revolutions, tangents),
-    squared lengths.
+    loaded and stored have a row of all lanes for each of the first rows of `layout_of`; strobe is (lanes, keep,
+    recorded), a ring buffer; growth is (lanes, revolutions, tangents), squared lengths.
     """
     tableau = Tableau.named(pair)
     rows = layout_of(field, len(tableau.phase))
