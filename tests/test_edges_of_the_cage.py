@@ -34,7 +34,6 @@ NEVER = {
     "palmgren_constant",
     "bearing.roller_material.density",
     "youngs_modulus",
-    "poisson_ratio",
     "load",
     "printed_unit",
 }

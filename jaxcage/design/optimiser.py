@@ -414,9 +414,9 @@ def _budget(problem: Problem, trial: Trial) -> list[Budget]:
     for i, name in enumerate(space.names):
         if name not in tolerance:
             continue
-        width = tolerance[name].upper - tolerance[name].lower
+        lower, upper = tolerance[name].lower, tolerance[name].upper
         slope = trial.slack_slope[:, i] / space.span[i]
-        takes = np.abs(slope * np.where(slope > 0, tolerance[name].lower, tolerance[name].upper))
+        takes = np.abs(slope * (np.where(slope > 0, lower, upper) - tolerance[name].least))
         room = np.divide(np.maximum(trial.slack, 0.0), takes, out=np.full(takes.size, np.inf), where=takes > 0)
         k, reached = int(np.argmin(room)), 1.0
         limit = problem.wanted[k].name if np.isfinite(room[k]) else ""
@@ -428,7 +428,7 @@ def _budget(problem: Problem, trial: Trial) -> list[Budget]:
                 reached = factor
                 break
             limit = made if isinstance(made, str) else broken[0].name
-        rows.append(Budget(name, width, reached, limit))
+        rows.append(Budget(name, upper - lower, reached, limit))
     return rows
 
 

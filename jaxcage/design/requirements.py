@@ -143,9 +143,15 @@ class Tolerance(NamedTuple):
         """Eccentricity left by balancing to a grade G [mm/s] at a cage speed [rad/s]: from 0 to e = G/speed."""
         return cls(0.0, 1e-3 * grade / speed, absolute=True)
 
+    @property
+    def least(self) -> float:
+        """Where a wider tolerance stays: the nominal value, or the end nearest to it; the lower end if `absolute`."""
+        return self.lower if self.absolute else min(max(0.0, self.lower), self.upper)
+
     def times(self, factor: float) -> "Tolerance":
-        """Tolerance wider by a factor."""
-        return self._replace(lower=factor * self.lower, upper=factor * self.upper)
+        """Tolerance wider by a factor on both sides of `least`."""
+        wider = lambda end: self.least + factor * (end - self.least)
+        return self._replace(lower=wider(self.lower), upper=wider(self.upper))
 
     def ends(self, value: float) -> tuple[float, float]:
         """Smallest and largest manufactured value [SI] for a nominal one."""

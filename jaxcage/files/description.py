@@ -42,6 +42,7 @@ BY_MATERIAL = {
 """Values that the material of the cage gives where a file does not, with their dotted names."""
 _USUAL = {"m": "mm", "kg": "g", "K": "degC"}
 """Units in which people think of a number that is wrong in SI."""
+_WITHOUT_UNIT = re.compile(rf"\s*{NUMBER}[-+±.()\s\deE]*")
 _GRADE = re.compile(rf"\s*G\s*({NUMBER})\s*(?:at\b\s*(.*?)\s*)?", re.IGNORECASE)
 
 
@@ -304,6 +305,9 @@ def _number(name: str, value: Any, info: ParameterInfo) -> float:
     must = f"`{name}` {must_be(info)}"
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ConfigError(f"{must}, but is {shown(value)}.")
+    if isinstance(value, str) and info.unit != "1" and _WITHOUT_UNIT.fullmatch(value):
+        example = f"{printable(value.strip())} {_USUAL.get(info.unit, info.unit)}"
+        raise ConfigError(f'{must}, but "{printable(value)}" has no unit: write "{example}" if that is meant.')
     try:
         if isinstance(value, str) and is_range(value):
             number = Known(read_range(value, info.unit))
@@ -324,7 +328,7 @@ def require_within(name: str, number: float, info: ParameterInfo, given: Any) ->
         return
     unit, usual = "" if info.unit == "1" else f" {info.unit}", _USUAL.get(info.unit)
     said = f' (given as "{printable(given)}")' if isinstance(given, str) else ""
-    if usual and math.isfinite(number) and (not isinstance(given, str) or re.fullmatch(NUMBER, given.strip())):
+    if usual and math.isfinite(number) and not isinstance(given, str):
         if within(to_si(f"{number:.17g} {usual}", info.unit), info.lower, info.upper):
             said += f'; with its unit it is written "{number:g} {usual}"'
     raise ConfigError(f"`{name}` {must_be(info)}, but is {number:g}{unit}{said}.")

@@ -275,7 +275,7 @@ class _Observer:
             ends = engine(numbers, states[:, 0], 1, 1, method, threads=cores(), **more).state
             states = np.stack([states[:, 0], ends], axis=1)
         apart = errors_of_parts(engine, numbers, states, self.model.dimension, method, **more)
-        return np.maximum(np.max(np.nan_to_num(apart), axis=1), getattr(method, "tolerance", 0.0))
+        return np.maximum(np.max(np.nan_to_num(apart, posinf=np.inf), axis=1), getattr(method, "tolerance", 0.0))
 
 
 def centres_of(

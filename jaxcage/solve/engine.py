@@ -448,15 +448,16 @@ def errors_of_parts(
     **more: Any,
 ) -> Float[np.ndarray, "lanes parts"]:
     """Error of each part of a run between `states` [scale]: three times the distance of its end from that by the
-    method's reference; `more` are arguments of the engine for each part."""
+    method's reference, infinite where that fails; `more` are arguments of the engine for each part."""
     count, parts = states.shape[0], states.shape[1] - 1
     begins, given = (
         states[:, :-1].reshape(count * parts, -1),
         engine.picked(numbers, np.repeat(np.arange(count), parts)),
     )
     sharper = engine(given, begins, 1, 1, method.reference, threads=cores(), **more).state
-    apart = np.abs(sharper.reshape(count, parts, -1) - states[:, 1:])
-    return SURE * np.max(apart[..., :dimension], axis=2)
+    apart = np.max(np.abs(sharper.reshape(count, parts, -1) - states[:, 1:])[..., :dimension], axis=2)
+    ran = np.all(np.isfinite(states[..., :dimension]), axis=2)
+    return SURE * np.where(ran[:, :-1] & ran[:, 1:] & np.isnan(apart), np.inf, apart)
 
 
 def errors_of_stretches(
