@@ -128,8 +128,8 @@ def plain(
 
 
 def extras(problem: Problem) -> str:
-    """Exponents along with ten revolutions beside plain revolutions of the same lanes."""
-    turns, initial_states = 10, problem.states[:, None]
+    """Exponents along with 100 revolutions beside plain revolutions of the same lanes."""
+    turns, initial_states = 100, problem.states[:, None]
     settings: dict[str, Any] = dict(initial_states=initial_states, discard=0, revolutions=turns, blocks=1, keep=1)
     swept = lambda k: jc.sweep(problem.model, problem.speeds, exponents=k, **settings)["last"]
     runs = {
