@@ -15,11 +15,17 @@ from jaxcage.files import own_rpm, read_bearing, template
 from jaxcage.solve import native
 
 
-IMPACT = """[impact]
-kind = "synchronous"
+IMPACTS = {
+    "synchronous": """kind = "synchronous"
 amplitude = "121.3 (5 .. 300) N"
 exponent = "1.483 (1 .. 2)"
-"""
+""",
+    "from_bearing": """kind = "from_bearing"
+approach_ratio = "3 (2 .. 4)"
+unmatched = "2 (1 .. 3)"
+""",
+}
+"""Impacts of a given amplitude, and those that follow from the bearing, more of them than in a new file."""
 PLANTED = 4
 """Bearings planted in the ranges of one file."""
 DESIGNS = {
@@ -78,12 +84,12 @@ class Statements(NamedTuple):
     calm: np.ndarray
 
 
-def written(folder: Path, designation: str, lines: dict[str, str]) -> Path:
-    """The short template with other lines, and impacts of a given amplitude."""
-    text = template("cage", short=True).partition("[impact]")[0] + IMPACT
+def written(folder: Path, kind: str, designation: str, lines: dict[str, str]) -> Path:
+    """The short template with other lines and impacts of a kind; an amplitude goes with synchronous ones only."""
+    text = template("cage", short=True).partition("[impact]")[0] + "[impact]\n" + IMPACTS[kind]
     for key, value in {"designation": f'"{designation}"', **lines}.items():
         text, found = re.subn(rf"(?m)^(# )?{key} = .*$", f"{key} = {value}", text)
-        assert found, key
+        assert found or key == "amplitude", key
     path = folder / f"{designation}.toml"
     path.write_text(text)
     return path
@@ -107,12 +113,14 @@ def statements(path: Path, shaft: tuple[float, float], rng: np.random.Generator)
 
 
 @pytest.mark.slow
-def test_stated_probabilities_come_true(tmp_path: Path):
+@pytest.mark.parametrize("kind", IMPACTS)
+def test_stated_probabilities_come_true(tmp_path: Path, kind: str):
     """The number of planted bearings that are calm is the sum of the stated probabilities, within twice its error: that
     of the planted bearings and that of the 64 draws behind each statement. Decided verdicts are not wrong more often
     than in one of twenty cases, and the Brier score is that of honest probabilities within twice its error."""
     rng = np.random.default_rng(59)
-    all_ = {name: statements(written(tmp_path, name, lines), at, rng) for name, (at, lines) in DESIGNS.items()}
+    path = lambda name: written(tmp_path, kind, name, DESIGNS[name][1])
+    all_ = {name: statements(path(name), at, rng) for name, (at, _) in DESIGNS.items()}
     for name, (chance, calm) in all_.items():
         print(f"{name}: {chance.share:.1%} calm stated, {chance.state}; {calm.sum()} of {PLANTED} calm")
     share, draws = (np.array([getattr(s.chance, of) for s in all_.values()]) for of in ("share", "draws"))
