@@ -81,9 +81,9 @@ def precision(sample: Problem, rivals: Sequence[Rival]) -> tuple[dict[str, dict[
         f"from {FIRST_RPM:.0f} to {LAST_RPM:.0f} rpm, three initial states in turn. "
         f"Reference: Rodas4 with {REFERENCE} steps. "
         "Microseconds per revolution and lane are those of the quickest of up to five calls.\n\n"
-        f"{markdown(['rival', 'setting', 'median', '99 %', 'us'], body)}\n\n"
+        f"{markdown(['program', 'setting', 'median', '99 %', 'us'], body)}\n\n"
         "That they solve the same equations: largest distance from the reference when tight, over the clearance.\n\n"
-        f"{markdown(['rival', 'setting', 'largest'], agree)}\n"
+        f"{markdown(['program', 'setting', 'largest'], agree)}\n"
     )
     return {name: pick(rows) for name, rows in ladders.items()}, text
 
@@ -117,12 +117,12 @@ def plain(
         ]
         for row in sorted(rows, key=lambda row: row["us"])
     ]
-    head = ["rival", "setting", "99 % error / c", "us", "ratio", "revolutions / s", "us, one core", "compile, s"]
+    head = ["program", "setting", "99 % error / c", "us", "ratio", "revolutions / s", "us, one core", "compile, s"]
     return (
         f"## Plain revolutions at a reached error of {TARGET:g}\n\n"
         "Microseconds per revolution and lane, all cores, median of three runs that take turns; ratio to the cheapest "
-        "row of jaxcage that reaches the target, marked `below`. Each rival is at its cheapest setting whose "
-        "one-revolution error is below the target in 99 % of states; `misses` where no setting of its ladder is.\n\n"
+        "row of jaxcage that reaches the target, marked `below`. Each program has the cheapest of its settings "
+        "whose one-revolution error is below the target in 99 % of states, or `misses` the target with all of them.\n\n"
         f"{markdown([*head, 'lanes x revolutions', 'slowest / fastest'], body)}\n"
     )
 

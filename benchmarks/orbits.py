@@ -177,9 +177,9 @@ def verdict(task: Task, ours: Row, autos: list[Row]) -> str:
     said = [f"{task.name} [{task.unit}]:"]
     if not autos[0].absent:
         said += [
-            f"AUTO's points are found to {within(ours, autos):.2g} of both error bars,",
-            f"in {ours.warm / autos[0].process:.1f} of its time warm",
-            f"and {ours.process / autos[0].process:.1f} in a new process.",
+            f"jaxcage's points differ from AUTO's by at most {within(ours, autos):.2g} of the sum of both error bars.",
+            f"jaxcage takes {ours.warm / autos[0].process:.1f} times as long as AUTO when warm",
+            f"and {ours.process / autos[0].process:.1f} times in a new process.",
         ]
     for place in task.known:
         nearby = min((abs(at - place), error) for (_, at), error in zip(ours.special, ours.errors, strict=True))

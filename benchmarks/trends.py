@@ -1,9 +1,9 @@
 """`python -m benchmarks.trends [--quick]`: slip against experiments and makers' rules, as `benchmarks/trends.md`.
 
 NU2310 as `jaxcage init --model bearing` writes it: drag, rolling resistance and traction depend on the oil and its
-temperature. Runs begin with rolling, and half of their revolutions is left out. A slip is the mean of the second half
-of the rest; its error is the change from the first half to the second, so that slip that still grows is uncertain. A
-cage below a twentieth of its speed has a slip of 95 % at least. Loads at a slip are bracketed by bisection.
+temperature. Runs begin with pure rolling, and half of their revolutions is left out. The slip is the mean of the second
+half of the rest; its error is the change from the first half to the second, so that a slip that still grows is
+uncertain. A cage below a twentieth of its speed has a slip of at least 95 %. Loads at 2 % slip are found by bisection.
 """
 
 import argparse
@@ -129,7 +129,8 @@ def trends(revolutions: int, steps: int, few: bool) -> list[Trend]:
     usual, brass = jc.bearing.listed("NU2310").minimum_loads(SPEED)
     fits = "agree" if usual / 2 < one.low and one.high < 2 * brass else "disagree"
     load = f"load at {SKIDDING:.0%} slip"
-    rows = [Trend(f"{load}, {SPEED:.0f} rpm", f"{usual:.0f} to {brass:.0f} N, within 2", SKF, str(one), fits)]
+    expected = f"{usual:.0f} to {brass:.0f} N, within a factor of 2"
+    rows = [Trend(f"{load}, {SPEED:.0f} rpm", expected, SKF, str(one), fits)]
     rows.append(ratio_trend(f"{load}, twice the speed over that", two, one, 1.4))
     rows.append(ratio_trend(f"{load}, cage of brass over polymer", one, light, brass / usual))
     asked = {
@@ -148,8 +149,10 @@ def trends(revolutions: int, steps: int, few: bool) -> list[Trend]:
 def page(rows: Sequence[Trend], revolutions: int) -> str:
     """The page in Markdown."""
     about = (__doc__ or "").split("\n\n", 1)[1].strip()
-    text = f"# Trends of slip\n\n{about}\n\nShaft at {SPEED:g} rpm, {LIGHT:g} N, {revolutions} revolutions.\n\n"
-    return f"{text}{markdown(['trend', 'expected', 'source', 'found', 'verdict'], rows)}\n\n{made_with()}\n"
+    usual = f"The shaft turns at {SPEED:g} rpm under {LIGHT:g} N unless a row says otherwise"
+    text = f"# Trends of slip\n\n{about}\n\n{usual}; runs have {revolutions} revolutions.\n\n"
+    table = markdown(["trend", "expected", "source", "found", "verdict"], rows).replace("---:", "---")
+    return f"{text}{table}\n\n{made_with()}\n"
 
 
 def main() -> None:

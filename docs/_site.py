@@ -179,6 +179,10 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     return re.sub(r"\]\(\.\./(?P<path>[^)#]+)", _moved, markdown)
 
 
+SPACE = '<mspace width="0.17em" />'
+"""Space around the name of a function in an equation."""
+
+
 def _formulas(html: str) -> Iterator[str]:
     for i, part in enumerate(re.split(r'<(?:span|div) class="arithmatex">(.*?)</(?:span|div)>', html, flags=re.S)):
         if i % 2 == 0:
@@ -187,6 +191,7 @@ def _formulas(html: str) -> Iterator[str]:
             latex = part.strip().replace("&amp;", "&").replace("&lt;", "<").replace("&gt;", ">")
             made = convert(latex[2:-2].strip(), display="block" if latex.startswith(r"\[") else "inline")
             made = re.sub(r'<mi mathvariant="bold">(\w)</mi>', lambda m: f"<mi>{_bold(m[1])}</mi>", made)
+            made = re.sub(r"(<m[io]>(?:sin|cos|tan|ln|arccos)</m[io]>)(?=<mi>)", rf"{SPACE}\1{SPACE}", made)
             yield made.replace("<mover>", '<mover accent="true">')
 
 
@@ -196,5 +201,5 @@ def _bold(letter: str) -> str:
 
 
 def on_page_content(html: str, **_: Any) -> str:
-    """Equations as MathML, which a browser draws by itself."""
-    return "".join(_formulas(html))
+    """Equations as MathML, which a browser draws by itself; options such as `--draws 0` stay on one line."""
+    return re.sub(r"<code>([^<\n]{1,25}</code>)", r'<code class="short">\1', "".join(_formulas(html)))

@@ -8,11 +8,11 @@
 #     name: python3
 # ---
 # %% [markdown]
-# # Which gap and which balance keep the cage calm from 12 500 to 18 000 rpm?
+# # Which gap and which balance keep the orbit stable from 12500 to 18000 rpm?
 # The cage of case 1a of the paper loses its stable orbit just below and just above this range of speed. Guidance gap
 # and balance move both edges. The design must keep 10 % of speed from both edges, for every cage whose gap is made
 # within 0.02 mm and whose eccentricity within 2 µm, at the lowest cost of turning and balancing. The edges solve
-# equations, so that their derivatives are exact, and the search needs few designs.
+# equations, so that their derivatives are exact.
 
 # %%
 import matplotlib.pyplot as plt

@@ -10,7 +10,7 @@
 # %% [markdown]
 # # Where does the cage move chaotically, and does a wider gap help?
 # Two of the paper's cages differ only in their guidance gap: 0.45 mm (case 1a) and 0.60 mm (case 1b). Both are
-# simulated from three initial states at every speed between 6000 and 14 000 rpm. This page shows how to read an orbit
+# simulated from three initial states at every speed between 6000 and 14000 rpm. This page shows how to read an orbit
 # diagram, and compares the chaotic zones of the two. `jaxcage sweep 1a` covers the whole range of speed.
 
 # %%
@@ -18,7 +18,7 @@ import matplotlib.pyplot as plt
 
 import jaxcage as jc
 from jaxcage.bearing import PUBLISHED_CASES
-from jaxcage.show import exponent_strip, mark_published, orbit_diagram
+from jaxcage.show import exponent_strip, legend_below, mark_published, orbit_diagram
 
 
 jc.keep_compiled_programs()
@@ -29,7 +29,7 @@ names = ("1a", "1b")
 # ## Settings of this page
 
 # %% tags=["parameters"]
-SPEEDS = 81  # number of speeds from 6000 to 14 000 rpm
+SPEEDS = 81  # number of speeds from 6000 to 14000 rpm
 DISCARD = 200  # revolutions before the first point of the diagram
 REVOLUTIONS = 200  # revolutions that the diagram shows
 
@@ -42,9 +42,9 @@ sweeps = {name: swept.isel(design=i) for i, name in enumerate(names)}
 # %% [markdown]
 # ## The orbit diagrams
 # Each point is the height of the cage once in a revolution. A periodic motion gives a few points, a chaotic one fills
-# a column. Red chaos lasts for at least 3000 revolutions, amber chaos dies out before. Dotted lines are the edges of
-# the zones that the paper prints. The strip below has the largest Lyapunov exponent: above the dashed line,
-# neighbouring motions part.
+# a column. Chaos labelled *chaotic* lasts for at least 3000 revolutions, *transient* chaos dies out before. Dotted
+# lines are the edges of the zones that the paper prints. The diagram below has the largest Lyapunov exponent: above
+# the dashed line, neighbouring motions diverge.
 
 
 # %%
@@ -53,10 +53,10 @@ def draw(name):
         2, 1, sharex=True, height_ratios=(2, 1), figsize=(10, 5), layout="constrained"
     )
     mark_published(orbit_diagram(sweeps[name], 1, above), PUBLISHED_CASES[name])
-    exponent_strip(sweeps[name], below).legend(loc="upper left", fontsize=7, ncols=2)
+    exponent_strip(sweeps[name], below)
     above.set_xlabel("")
     figure.suptitle(f"Case {name}: guidance gap {PUBLISHED_CASES[name].guidance_gap_mm:.2f} mm")
-    above.legend(loc="lower left", fontsize=7, markerscale=3, ncols=3)
+    legend_below(figure)
     plt.show()
 
 
@@ -77,7 +77,7 @@ for name, sweep in sweeps.items():
 
 # %% [markdown]
 # ## Conclusion
-# The main zone lies between 9450 ± 450 and 12 150 ± 150 rpm with a gap of 0.45 mm, and between 9150 ± 350 and
-# 11 850 ± 250 rpm with 0.60 mm. Both edges are 300 rpm lower, which is less than their errors together, and the zone
+# The main zone lies between 9450 ± 450 and 12150 ± 150 rpm with a gap of 0.45 mm, and between 9150 ± 350 and
+# 11850 ± 250 rpm with 0.60 mm. Both edges are 300 rpm lower, which is less than their errors together, and the zone
 # is 2700 rpm wide in both cases: the wider gap does not narrow it. It also lets chaos that dies out reach further up,
-# from 12 500 to 14 000 rpm.
+# from 12500 to 14000 rpm.

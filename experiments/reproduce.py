@@ -194,9 +194,10 @@ def paper_diagrams(runs: Runs) -> Iterator[tuple[str, Figure]]:
             published = PUBLISHED_CASES[case]
             jc.show.mark_published(jc.show.orbit_diagram(runs.sweeps[case], 1, ax), published, text=False)
             oil, gap = f"VG{published.viscosity_grade:g}", f"gap {published.guidance_gap_mm} mm"
-            text = f"Case {case}: {gap}, eccentricity {published.eccentricity_um:g} um, {oil}"
-            ax.set_title(f"{text}; dotted, published edges", loc="left", fontsize=10)
+            text = f"Case {case}: {gap}, eccentricity {published.eccentricity_um:g} µm, {oil}"
+            ax.set_title(text, loc="left", fontsize=10)
         cells[0].set_xlabel("")
+        jc.show.legend_below(drawn)
         yield f"fig7{panel}", jc.show.add_shaft_axes(drawn, runs.sweeps[f"{number}a"])
 
 

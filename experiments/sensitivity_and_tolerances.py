@@ -8,11 +8,11 @@
 #     name: python3
 # ---
 # %% [markdown]
-# # Which tolerance of the drawing scatters the calm range most?
-# The cage of case 2a is calm above an edge at 13 049 rpm. Five parameters, three of them on the drawing, are each
-# within 5 % of their values. This page computes how much that scatters the edge, by exact derivatives, and checks the
-# result by solving for the edge in random bearings. A second measure, Sobol indices, needs no edge: it asks what
-# decides how much of the whole speed range is chaotic.
+# # Which tolerance of the drawing scatters the stable range most?
+# The synchronous orbit of case 2a is stable above an edge at 13049 rpm. Five parameters, three of them on the drawing,
+# are each within 5 % of their values. This page computes how much that scatters the edge, by exact derivatives, and
+# checks the result by solving for the edge in random bearings. A second measure, Sobol indices, needs no edge: it
+# tells which parameters decide how much of the whole speed range is chaotic.
 
 # %%
 import matplotlib.pyplot as plt
@@ -43,7 +43,7 @@ SAMPLES = 128  # number of base samples of the Sobol indices, each of which take
 # %%
 orbits = jc.synchronous_orbits(model, jc.rpm(12700), jc.rpm(13700), count=21, discard=1500)
 edge = next(point for point in orbits.edges if point.kind == "period-doubling")
-exact = jc.sensitivity(model, edge, "lower edge of the calm range")
+exact = jc.sensitivity(model, edge, "lower edge of the stable range")
 budget = jc.design.tolerance_budget(exact, dict.fromkeys(varied, 0.05 / np.sqrt(3)))
 print(budget)
 
@@ -75,7 +75,7 @@ plt.show()
 
 # %% [markdown]
 # ## Without an edge
-# Sobol indices share out the variance of the chaotic part of 4000 to 27 500 rpm, over designs within ±20 %. A total
+# Sobol indices share out the variance of the chaotic part of 4000 to 27500 rpm, over designs within ±20 %. A total
 # index is the share of a parameter with all its interactions; that is why they add up to more than 1. They take many
 # simulations, and tell no more than their intervals allow.
 
@@ -104,7 +104,7 @@ plt.show()
 
 # %% [markdown]
 # ## Conclusion
-# The cage mass makes 70 % of the edge's variance and the amplitude of the impacts 30 %; guidance gap, eccentricity and
-# land width make less than 1 %, so that narrower tolerances of these would buy nothing for this edge. In 40 bearings
+# The cage mass causes 70 % of the edge's variance and the amplitude of the impacts 30 %; guidance gap, eccentricity
+# and land width cause less than 1 %, so that narrower tolerances of these would not change this edge. In 40 bearings
 # the edges solved for have a standard deviation of 481 ± 54 rpm, to first order 483. How much of the whole speed range
 # is chaotic is another question: there the gap counts most (0.60, 95 % interval 0.46 to 0.77).

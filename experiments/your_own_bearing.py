@@ -8,7 +8,7 @@
 #     name: python3
 # ---
 # %% [markdown]
-# # Does the cage of your own bearing stay calm from 4000 to 14 000 rpm of the shaft?
+# # Does the cage of your own bearing stay calm from 4000 to 14000 rpm of the shaft?
 # A bearing is a TOML file. This page describes an NU1014 in an imagined machine, and asks whether its cage stays calm.
 # Ten numbers in the file are known within a range only. The answer is therefore a chance, with an error.
 

@@ -120,7 +120,7 @@ _QUANTITIES = (
     Quantity("steps", "", "1", "mean number of steps of a revolution"),
     Quantity("escape", "", "1", "revolutions of the run after which a lane is calm, infinite if chaotic to the end"),
     Quantity("outcome", "", "1", "how the integration of each lane ended"),
-    Quantity("label", "", "1", "what each lane does"),
+    Quantity("label", "", "1", "kind of motion of each lane"),
     Quantity("chaotic_share", "", "1", "share of the finished lanes that are chaotic while observed"),
 )
 

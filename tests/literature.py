@@ -405,7 +405,7 @@ def page(found: dict[str, list[Row]]) -> str:
         f"The numbers were made with jaxcage {jc.__version__} by `python tests/literature.py`.\n",
         "A tolerance is what the source supports: half a unit of the last printed digit where ours is exact, more",
         "where theirs was computed on a coarse grid or ours is a finite sample. FAILS marks a difference beyond it.",
-        "A source is one that can be opened, or a second computation that shares no code with what it is held against.",
+        "A source is a publication that can be read, or a second computation that shares no code with the first one.",
     ]
     for topic, of in found.items():
         lines += [f"\n## {topic.capitalize()}\n", "| what | theirs | ours | difference | tolerance | | source |"]

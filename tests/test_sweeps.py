@@ -52,7 +52,7 @@ def test_chaos_is_followed_to_the_horizon(followed):
     assert np.all(np.isinf(escape[label == "chaotic"]))
     assert np.all(np.isfinite(escape[label == "transient"]))
     assert np.all((escape[label == "transient"] > 30) & (escape[label == "transient"] <= horizon))
-    assert horizon >= 700 and "chaos followed to" in summary(followed)
+    assert horizon >= 700 and "chaos continued to" in summary(followed)
     late = raw_sweep(
         UEDA,
         followed["speed"].values,

@@ -30,8 +30,8 @@ def failed(found: xr.Dataset) -> Bool[np.ndarray, "*lanes"]:
 
 
 def length(found: xr.Dataset) -> str:
-    """Text with the numbers of revolutions discarded, observed and followed."""
-    lasting = f", chaos followed to {found.attrs['horizon']}" if found.attrs["horizon"] else ""
+    """Text with the numbers of revolutions discarded, observed and, for chaos, at most."""
+    lasting = f", chaos continued to {found.attrs['horizon']}" if found.attrs["horizon"] else ""
     return f"{found.attrs['discard']} + {found.attrs['revolutions']} revolutions{lasting}"
 
 

@@ -135,7 +135,7 @@ def statics(
         raise InputError(f"The load of {subject.name} must be above 0 N, but it is {force:g}: give one with --load.")
     shaft = 0.0 if speed is None else float(subject.both(subject.speed(speed))["shaft_speed_rpm"]) / RPM
     found = jc.bearing.load_distribution(bearing, force, bearing.roller_centrifugal_force(shaft))
-    title = f"{subject.name} at {force:g} N, {f'shaft at {shaft * RPM:g} rpm' if shaft else 'at rest'}"
+    title = f"{subject.name} at {force:g} N, {f'shaft at {shaft * RPM:.0f} rpm' if shaft else 'at rest'}"
     loads = np.asarray(found.inner_loads)
     said = f"{np.sum(loads > 0)} of {loads.size} rollers carry {force:g} N, the most loaded one {np.max(loads):.0f} N."
     document: dict[str, Any] = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}

@@ -107,7 +107,7 @@ from .slope_tables import (
     to_be_turned as to_be_turned,
     width_table as width_table,
 )
-from .style import drawn as drawn, new_figure as new_figure
+from .style import drawn as drawn, legend_below as legend_below, new_figure as new_figure
 from .tables import Column as Column, Table as Table, counted as counted, shares_table as shares_table, table as table
 from .verdict_tables import (
     MOTION_WORDS as MOTION_WORDS,

@@ -106,14 +106,15 @@ def optimum_figure(found: "Optimum", rows: Sequence["BeforeAfter"], title: str =
     """Figure of the progress of a search, and of the relative changes of all nonzero statistics with two standard
     errors, grey if within them."""
     shown = [row for row in rows if row.before]
-    names = [readable(head_of(row.name, row.unit)) for row in shown]
+    unit = next((f" [{row.unit}]" for row in rows if row.name == "objective" and row.unit != "1"), "")
 
     def search(ax: Axes) -> None:
         ax.plot(np.arange(1, len(found.history) + 1), np.minimum.accumulate(found.history), "o-", color=BLUE)
-        ax.set(xlabel="Step", ylabel="Best objective so far")
+        ax.set(xlabel="Step", ylabel=f"Best objective so far{unit}")
 
     def changes(ax: Axes) -> None:
         change, error = (100 * np.array([getattr(r, n) / r.before for r in shown]) for n in ("change", "change_error"))
+        names = [f"{readable(head_of(row.name, row.unit))}: {x:+.3g} %" for row, x in zip(shown, change, strict=True)]
         _bars_with_errors(ax, names, change, error, [BLUE if row.known else GREY for row in shown])
         ax.set_xlabel("Change [%], with two standard errors", fontsize=9)
 

@@ -175,7 +175,7 @@ def exponent_strip(sweep: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.fill_between(rpm, top - band, top + band, **shade)
     ax.plot(rpm, top, color=style.BLUE, linewidth=0.9, label="largest of the initial states")
     ax.set(xlim=speed_limits(sweep), ylim=_exponent_limits(largest, top, band))
-    ax.set_ylabel("largest exponent\nper revolution " + quantity("largest_exponent").symbol)
+    ax.set_ylabel("Largest exponent\nper revolution " + quantity("largest_exponent").symbol)
     return label_speed(ax, sweep)
 
 

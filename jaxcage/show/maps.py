@@ -211,7 +211,7 @@ def _colour_labels(ax: Axes, x: np.ndarray, y: np.ndarray, labels: np.ndarray) -
     colour = lambda lanes: pale(known.get(lanes[0], style.GREY) if len(set(lanes)) == 1 else style.GREY)
     image = np.array([[colour(lanes.tolist()) for lanes in row] for row in kinds.swapaxes(0, 1)])
     ax.pcolormesh(x, y, image)
-    ax.set_title("Label (grey: initial states differ, or failed)", fontsize=10, loc="left")
+    ax.set_title("Label (grey: initial states differ, or failed)", fontsize=10, loc="left", pad=20)
     met = [name for name in known if np.any(kinds == name)]
     patches: list[Any] = [Patch(color=pale(known[name]), label=motion_words([name])) for name in met]
-    ax.legend(handles=patches, fontsize=8, loc="upper right")
+    style.legend_above(ax, handles=patches, size=8)

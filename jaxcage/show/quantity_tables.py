@@ -50,12 +50,16 @@ def quantity_words(quantity: Quantity, value: float) -> str:
     return f"{head_of(quantity.name, quantity.unit)} {value:.4g} {quantity.unit}".removesuffix(" 1")
 
 
+HEADS = {"size": "orbit size", "eccentricity": "largest eccentricity ratio"}
+"""Column headers of variables of a ramp, whose names alone are ambiguous."""
+
+
 def column_of(found: xr.Dataset, name: str) -> Column:
     """Column of a variable, with its unit and its error."""
     if name in ("exponent", "exponents"):
         return Column("largest exponent per revolution", name, error=f"{name}_error")
     unit = found[name].attrs["units"]
-    return Column(head_of(name, unit), name, unit, "%" if name in SHARES else None, f"{name}_error")
+    return Column(HEADS.get(name, head_of(name, unit)), name, unit, "%" if name in SHARES else None, f"{name}_error")
 
 
 def quantities_table(title: str, found: xr.Dataset, names: Sequence[str]) -> Table:

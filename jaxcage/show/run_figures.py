@@ -268,7 +268,7 @@ def load_bars(distribution: LoadDistribution, ax: Axes | None = None) -> Axes:
     angles = (np.degrees(np.asarray(distribution.roller_angles)) + 270) % 360 - 180
     half = float(np.degrees(np.asarray(distribution.half_angle)))
     ax.bar(angles, np.asarray(distribution.inner_loads), width=0.5 * 360 / angles.size, color=style.BLUE)
-    for edge, label in ((-half, f"half angle {half:.1f}°"), (half, None)):
+    for edge, label in ((-half, f"loaded zone, half angle {half:.1f}°"), (half, None)):
         ax.axvline(edge, color=style.GREY, linewidth=1.0, linestyle="--", label=label)
     ax.set(xlim=(-190, 190), xticks=range(-180, 181, 45))
     ax.set(xlabel="Angle from the load [°]", ylabel="Roller load on the inner raceway [N]")

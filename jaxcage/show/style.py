@@ -114,9 +114,10 @@ def enlarge_dots(legend: Legend) -> None:
             handle.set(markersize=7, alpha=1.0)
 
 
-def legend_above(ax: Axes, ncols: int = 4, size: float | int = 9) -> None:
+def legend_above(ax: Axes, ncols: int = 4, size: float | int = 9, **given: Any) -> None:
     """Add a legend above the frame, where it hides nothing."""
-    enlarge_dots(ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=ncols, frameon=False, fontsize=size))
+    place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+    enlarge_dots(ax.legend(**place, ncols=ncols, frameon=False, fontsize=size, **given))
 
 
 def legend_beside(ax: Axes, size: float | int = 9) -> None:
