@@ -111,10 +111,11 @@ def optimum_figure(found: "Optimum", rows: Sequence["BeforeAfter"], title: str =
     def search(ax: Axes) -> None:
         ax.plot(np.arange(1, len(found.history) + 1), np.minimum.accumulate(found.history), "o-", color=BLUE)
         ax.set(xlabel="Step", ylabel=f"Best objective so far{unit}")
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
 
     def changes(ax: Axes) -> None:
         change, error = (100 * np.array([getattr(r, n) / r.before for r in shown]) for n in ("change", "change_error"))
-        names = [f"{readable(head_of(row.name, row.unit))}: {x:+.3g} %" for row, x in zip(shown, change, strict=True)]
+        names = [f"{readable(head_of(row.name, row.unit))}: {x:+.1f} %" for row, x in zip(shown, change, strict=True)]
         _bars_with_errors(ax, names, change, error, [BLUE if row.known else GREY for row in shown])
         ax.set_xlabel("Change [%], with two standard errors", fontsize=9)
 
