@@ -93,6 +93,19 @@ def test_errors_of_successful_lanes_are_stated_and_within_the_tolerance(wide):
     assert finished >= 18
 
 
+def test_the_first_transient_of_a_light_cage_in_thick_oil_is_passed():
+    """The film stops it within 1e-10 rad; implicit steps go on with the forced motion, as equal ones do that begin with
+    3e-3 rad."""
+    oil = {"viscosity_1": 0.03, "viscosity_2": 0.0038}
+    model = replaced(guidance_gap=1.46e-5, eccentricity=1.5e-6, cage_mass=2e-3, land_width=6e-3, **oil)
+    once = SHORT | dict(discard=0, revolutions=1, blocks=1)
+    ours, equal = (
+        jc.sweep(model, jc.rpm(445.0, 445.0, 1), **once, method=method)["last"].values
+        for method in (jc.native(), jc.method("rodas4", steps=2048))
+    )
+    np.testing.assert_allclose(ours[..., :2], equal[..., :2], rtol=0, atol=1e-5 * float(model.clearance))
+
+
 @pytest.mark.wide
 def test_a_hopeless_design_leaves_its_neighbours_as_they_are():
     designs = [MODEL, beyond_range(MODEL, stiffness=1e20, onset=0.3), replaced(eccentricity=2e-5)]

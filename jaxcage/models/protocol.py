@@ -77,7 +77,7 @@ class AbstractForcedSystem(eqx.Module):
     """Settings of a run (`jaxcage.lanes.Run`) that suit the model better than the general ones."""
     speed_text: ClassVar[str] = "speed"
     """Words for the model's speed."""
-    steps: ClassVar[StepLimits] = StepLimits(0.05, math.pi / 2, 1e-10, 20_000.0)
+    steps: ClassVar[StepLimits] = StepLimits(0.05, math.pi / 2, 1e-13, 20_000.0)
     """Limits of the steps; the period of the forcing's highest harmonic has two at least."""
     quantities: ClassVar[tuple[Quantity, ...]] = ()
     """Quantities that the model reports of a run, which follow from `beside` and `watched`."""
