@@ -288,7 +288,7 @@ def replace(module: M, **values: PyTree) -> M:
             _require_range(name, value, info)
     changed = _changed(module, {(name,) if name in parts else paths[name]: value for name, value in values.items()})
     for path, field in walk(changed) if parts & values.keys() else ():
-        if path[0] in values and (info := field.metadata.get("parameter")):
+        if {path[0], "forces"} & values.keys() and (info := field.metadata.get("parameter")):
             _require_range(".".join(path), get(changed, path), info)
     return changed
 
