@@ -102,9 +102,10 @@ def wrong(annotation: Any, value: Any, in_row: bool = False) -> str:
 
 def _wrong_one(kind: Any, value: Any, may_miss: bool) -> str:
     origin, inside = typing.get_origin(kind), typing.get_args(kind)
-    if kind is float or (is_array_type(kind) and kind.dim_str == ""):
+    single = is_array_type(kind) and kind.dim_str == ""
+    if kind is float or (single and "Int" not in str(kind)):
         return _wrong_number(value, may_miss)
-    if kind is int:
+    if kind is int or single:
         return "" if _is_count(value) else f"{WHOLE} of at most {MOST}" if type(value) is int else WHOLE
     if kind is bool:
         return "" if isinstance(value, bool | np.bool_) else "True or False"

@@ -235,12 +235,13 @@ def unit_dimensions(unit: str) -> dict[str, float]:
     """Exponents of mass, length and time in a unit such as `N s/m` or `N/m^(10/9)`. **Raises:** `ValueError` for a unit
     that is not made of 1, rad, K, kg, m, s, N, Pa."""
     above, _, below = unit.partition("/")
+    wanted = f"must be made of {', '.join(_BASES)}, with powers as in `N s^2/m^2`"
     total = [0.0, 0.0, 0.0]
     for sign, factors in ((1, above), (-1, below)):
         for factor in factors.split():
             base, _, power = factor.partition("^")
             if base not in _BASES:
-                raise ArgumentError("unit", said=f"must be made of {', '.join(_BASES)}, but '{unit}' was given.")
+                raise ArgumentError("unit", said=f"{wanted}, but '{unit}' was given.")
             exponent = sign * float(Fraction(power.strip("()") or "1"))
             total = [t + exponent * b for t, b in zip(total, _BASES[base], strict=True)]
     return dict(zip(("mass", "length", "time"), total, strict=True))
@@ -285,7 +286,11 @@ def replace(module: M, **values: PyTree) -> M:
             raise ArgumentError(name, said=f"must be one of {', '.join(offered)}, but {value!r} was given.")
         if info := metadata.get("parameter"):
             _require_range(name, value, info)
-    return _changed(module, {(name,) if name in parts else paths[name]: value for name, value in values.items()})
+    changed = _changed(module, {(name,) if name in parts else paths[name]: value for name, value in values.items()})
+    for path, field in walk(changed) if parts & values.keys() else ():
+        if {path[0], "forces"} & values.keys() and (info := field.metadata.get("parameter")):
+            _require_range(".".join(path), get(changed, path), info)
+    return changed
 
 
 def _changed(module: Any, changes: Mapping[tuple[str, ...], Any]) -> Any:

@@ -42,6 +42,7 @@ unwrap = inspect.unwrap
         (lambda: jc.simulate(DUFFING, 1e300, revolutions=2), "`speed` must be positive and finite, at most"),
         (lambda: jc.simulate(DUFFING, 1.0, revolutions=1, start=(np.nan, 0.0)), r"finite numbers, but \(nan, 0.0\)"),
         (lambda: jc.periodic_orbit(DUFFING, 1.0, method="rk4"), "`method` must be of kind AbstractMethod, but 'rk4'"),
+        (lambda: jc.periodic_orbit(DUFFING, 1.0, 1.5), "`periods` must be a whole number, but 1.5"),
         (lambda: jc.periodic_orbit(DUFFING, 1.0, guess=3), "`guess` must be a state of 2 numbers, but 3"),
         (lambda: jc.bifurcation(DUFFING, "fold", 1.0), "`guess` must be a state and a number, an `Orbit` or a `Point`"),
         (lambda: jc.bifurcation(DUFFING, "fold", (1, 2, 3)), r"`guess` must be .*, but \(1, 2, 3\) was given"),

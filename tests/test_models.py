@@ -193,7 +193,7 @@ def test_a_law_that_does_not_repeat_is_refused(multiple):
         ValueError, match=r"The law `acceleration.* must repeat after one revolution \(tau -> tau \+ 2 pi"
     ):
         jc.ForcedOscillator(Driven(jnp.asarray(multiple)), coordinates=1)
-    with pytest.raises(ValueError, match="The law `rates.* take the slowest forcing as the revolution"):
+    with pytest.raises(ValueError, match="The law `rates.*take the slowest forcing as the revolution"):
         jc.ForcedSystem(lambda tau, y, speed: (-y[0] + jnp.cos(multiple * tau),), 1)
     with pytest.raises(ValueError, match="must repeat after one revolution"):  # in time
         jc.ForcedSystem(lambda tau, y, speed: (-y[0] + jnp.cos(3 * tau / speed),), 1)

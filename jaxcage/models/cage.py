@@ -34,6 +34,7 @@ from ..forces import (
 )
 from ..quantities import component_names
 from .field import AbstractField, SecondOrderField
+from .oscillator import require_repeats
 from .protocol import AbstractForcedSystem, told
 
 
@@ -47,6 +48,8 @@ TINY = 1e-30
 """Square of a speed [m^2/s^2] that keeps a division from being by zero."""
 ONSET_WIDTH = 4.0
 """Distance from the onset of land contact, in smoothing lengths, within which steps are not shortened any more."""
+SOMEWHERE = (0.4, 0.3, 20.0, -30.0)
+"""State, over the clearance, in which a user's force is evaluated to see that it repeats."""
 SMOOTHEST = 0.1
 """Largest smoothing length over clearance: a larger one is no detail of the contact or of the film's centre."""
 
@@ -186,6 +189,10 @@ class CageModel(AbstractForcedSystem):
                     f"{name}.smoothing",
                     said=f"must be at most a tenth of the clearance, {room:g} mm, but is {given:g} mm.",
                 )
+        motion = lambda tau, y, w: Motion(tau, *y, w, 0.0, self.bearing.shaft_speed(w), self._land)
+        for law in self.extra:
+            force = lambda tau, y, w, law=law: law.at(self, w).force(motion(tau, y, w))
+            require_repeats(f"Force `{type(law).__name__}`", force, [(tuple(clearance * np.array(SOMEWHERE)),)])
 
     def __getattr__(self, name: str) -> Any:
         """The law of that name, such as `film`."""
@@ -240,13 +247,17 @@ class CageModel(AbstractForcedSystem):
 
     def cage_at(self, speed: Scalar) -> CageAtSpeed:
         """The cage's force laws at `speed` [rad/s]."""
-        named, extra, c = [law for law in self.forces if law.law_name], self.extra, self.clearance
+        named, extra = [law for law in self.forces if law.law_name], self.extra
         arm = effective_eccentricity(self.unbalance, self.eccentricity, self.guidance_gap, self.printed_unit)
         own = {"unbalance": UnbalanceForce(self.cage_mass * arm), "weight": WeightForce(self.cage_mass * self.gravity)}
         laws = (*(law.at(self, speed) for law in named), *own.values(), *(law.at(self, speed) for law in extra))
         names = (*(law.law_name for law in named), *own, *(type(law).__name__ for law in extra))
-        land = Land(c, 1 / c, self.contact.onset, self.contact.smoothing / c, self.film.smoothing / c)
-        return CageAtSpeed(laws, names, land, self.cage_mass, speed, self.bearing.shaft_speed(speed))
+        return CageAtSpeed(laws, names, self._land, self.cage_mass, speed, self.bearing.shaft_speed(speed))
+
+    @property
+    def _land(self) -> Land:
+        c = self.clearance
+        return Land(c, 1 / c, self.contact.onset, self.contact.smoothing / c, self.film.smoothing / c)
 
     def at_speed(self, speed: Scalar) -> AbstractField:
         cage = self.cage_at(speed)

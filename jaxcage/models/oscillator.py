@@ -102,8 +102,9 @@ def require_repeats(
         raise ArgumentError("angles", said=said)
     if later:
         raise InputError(
-            f"{what} must repeat after one revolution (tau -> tau + 2 pi), but does not: take the slowest forcing as "
-            "the revolution, so that all others are whole multiples of it, and `jnp.mod(tau, 2 * jnp.pi)` in pulses."
+            f"{what} must repeat after one revolution (tau -> tau + 2 pi), but does not: all forcings must be whole "
+            "multiples of the revolution (take the slowest forcing as the revolution, except of a cage), and pulses "
+            "functions of `jnp.mod(tau, 2 * jnp.pi)`."
         )
 
 

@@ -99,9 +99,10 @@ class Trajectory:
         return float(np.max(self.peaks[:, self.watched.index(name)]))
 
     def __str__(self) -> str:
+        away = f"largest excursion {self.peak:.3f}, " if self.peak else ""  # 0 for a system without an edge
         return (
             f"Trajectory of {self.time.size / self.samples:g} revolutions, {self.samples} samples each, "
-            f"{self.rpm[0]:.0f} to {self.rpm[-1]:.0f} rpm, {self.outcome}, largest excursion {self.peak:.3f}, "
+            f"{self.rpm[0]:.0f} to {self.rpm[-1]:.0f} rpm, {self.outcome}, {away}"
             f"error of a revolution at most {self.error:.0e}"
         )
 
