@@ -170,7 +170,7 @@ def test_report(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     assert said in html.unescape(text.partition("<h2>Verdict</h2>")[2].partition("</p>")[0])
     titles = "Verdict", "Zones", "The synchronous orbit", "Stability map", "Statics"
     assert all(f"<h2>{title}</h2>" in text for title in titles)
-    assert "Minimum load against skidding at 33650 rpm of the shaft" in text.partition("<h2>Statics</h2>")[2]
+    assert "Minimum load against skidding at 33646 rpm of the shaft" in text.partition("<h2>Statics</h2>")[2]
     assert main(["check", "1a", "--operating", "13000-13500 rpm", "--out", str(tmp_path)]) == 0
     assert " ".join(capsys.readouterr().out.partition("\n\n")[0].split()) == said
 
