@@ -85,6 +85,8 @@ def test_a_preloaded_bearing_under_load(load, centrifugal):
 def test_a_cage_model_takes_no_preload():
     with pytest.raises(ValueError, match="radial_clearance` must be at least 0 for a cage model.*is -10 um"):
         jc.replace(jc.case("1a"), radial_clearance=-10e-6)
+    with pytest.raises(ValueError, match="^Argument `bearing.radial_clearance` must be at least 0"):
+        jc.files.model_from({"base": "1a", "bearing": {"radial_clearance": "-10 um"}})
     assert float(jc.replace(jc.whole_bearing("nu2310"), radial_clearance=-50e-6).bearing.radial_clearance) == -50e-6
     with pytest.raises(ValueError, match="from -5e-05 to 0.001 m, but is -6e-05 m"):
         jc.replace(jc.whole_bearing("nu2310"), radial_clearance=-60e-6)

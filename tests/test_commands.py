@@ -170,8 +170,24 @@ def test_report(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     assert said in html.unescape(text.partition("<h2>Verdict</h2>")[2].partition("</p>")[0])
     titles = "Verdict", "Zones", "The synchronous orbit", "Stability map", "Statics"
     assert all(f"<h2>{title}</h2>" in text for title in titles)
+    assert "Minimum load against skidding at 33646 rpm of the shaft" in text.partition("<h2>Statics</h2>")[2]
     assert main(["check", "1a", "--operating", "13000-13500 rpm", "--out", str(tmp_path)]) == 0
     assert " ".join(capsys.readouterr().out.partition("\n\n")[0].split()) == said
+
+
+def test_a_range_is_named_by_the_speeds_that_were_given(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """A file whose bare speeds are those of the shaft, of a cage without an edge."""
+    file = str(write_template(tmp_path / "mine.toml", short=True))
+    assert main(["gradient", file, "--first", "9000", "--last", "9500", "--count", "3"]) == 1
+    said = "ends within 9000 to 9500 rpm of the shaft: there is no edge"
+    assert said in " ".join(capsys.readouterr().err.split())
+    few = "--first 9000 --last 9500 --count 2 --samples 2 --quick --out".split()
+    light = tmp_path / "light.toml"  # its support damps it: exponents are about -0.3
+    light.write_text(Path(file).read_text().replace('"brass" ', '"PA66-GF25" '))
+    assert main(["sensitivity", str(light), *few, str(tmp_path)]) == 0
+    assert capsys.readouterr().out.startswith("No design is chaotic within 9000 to 9500 rpm of the shaft: there is no")
+    said = "but the range is 9000 to 8000 rpm of the shaft."
+    assert refused(capsys, "gradient", file, "--first", "9000", "--last", "8000").endswith(said)
 
 
 @pytest.mark.wide

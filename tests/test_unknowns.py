@@ -54,6 +54,8 @@ def by_stiffness(draws: int = 64) -> Ensemble:
         ("-5e3 .. 5e3 N/m", "N/m", -5e3, 5e3, 0.0),
         ("40 .. 60 degC", "K", 313.15, 333.15, 323.15),
         ("20 um +- 3 um", "m", 17e-6, 23e-6, 20e-6),
+        ("0.40 ± 0.08 mm", "m", 0.32e-3, 0.48e-3, 0.4e-3),
+        ("0.40 mm +/- 0.08", "m", 0.32e-3, 0.48e-3, 0.4e-3),
     ],
 )
 def test_ranges_as_they_are_written(text: str, unit: str, lower: float, upper: float, best: float):

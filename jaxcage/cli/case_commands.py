@@ -188,7 +188,8 @@ def report(
         parts = [*parts[:1], *((f"{title} at the best guess", guess(each)) for title, each in parts[1:])]
     if float(getattr(subject.model, "load", 0.0)) > 0:
         fastest = None if at is None else jc.files.SpeedOf(at[1] * RPM, subject.own)
-        parts.append(("Statics", dataclasses.replace(statics(subject, speed=fastest), notes=())))
+        loads = statics(subject, speed=fastest)  # the verdict with rollers compares the minimum load already
+        parts.append(("Statics", dataclasses.replace(loads, notes=()) if subject.with_rollers and at else loads))
     design = jc.show.sources_table(subject.model, subject.file)
     made = jc.show.settings_table(found, time.perf_counter() - began)
     sections = [_section(*part) for part in parts]

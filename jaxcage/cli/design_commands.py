@@ -190,7 +190,9 @@ def sensitivity(
     runs, measured = _runs(subject, over, means, progress=partial(report, "designs")), d.BEARING_MEASURES[of]
     ends = runs.speed[0] * RPM, runs.speed[-1] * RPM
     value = d.statistic(model, measured) if subject.with_rollers else d.chaotic_width(*ends)
-    shares = d.global_sensitivity(model, bounds, value.blocks(runs), samples=samples or subject.usual(64, 32))
+    blocks, seen = value.blocks(runs), list[Any]()
+    keep = lambda models: seen.append(blocks(models)) or seen[-1]
+    shares = d.global_sensitivity(model, bounds, keep, samples=samples or subject.usual(64, 32))
     slopes: list[tuple[Any, Any]] = []
     if subject.with_rollers and not quick:
         known = jc.parameters(model)
@@ -214,7 +216,10 @@ def sensitivity(
     tables = [jc.show.sobol_table(f"{what.capitalize()} of {name}", shares)]
     tables += [jc.show.budget_table(budget, tolerance) for budget in budgets]
     notes = [f"Too few samples to believe: {', '.join(shares.doubtful)}"] if shares.doubtful else []
-    if shares.scatter:
+    if not subject.with_rollers and np.max(seen) < 1e-3 * (ends[1] - ends[0]):  # a chaotic speed counts half or more
+        said = f"No design is chaotic within {subject.over(*runs.speed[[0, -1]])}: there is no variance to share."
+        tables, notes = tables[1:], []
+    elif shares.scatter:
         scatter = f"Scatter of the motion is {100 * shares.scatter:.0f} % of the variance"
         notes.append(f"{scatter}, in no parameter's own share.")
     document = {"vary": bounds, "of": what, "tolerance_percent": tolerance, "designs": shares.evaluations}

@@ -61,9 +61,9 @@ def _searched(subject: Subject, over: o.Range, discard: int | None, method: Any,
     """Synchronous orbits over speed, and their unstable ranges. **Raises:** `NoResult` if there are none, or no edges
     although the `purpose` needs some."""
     length: dict[str, Any] = {name: x for name, x in (("count", over.count), ("discard", discard)) if x is not None}
-    told = {"method": method, "progress": report}
-    found = jc.orbits.synchronous_orbits(subject.model, *subject.ends(over), **length, **told)
-    between, loss = f"between {found.lower_rpm:g} and {found.upper_rpm:g} rpm", jc.unstable_ranges(found)
+    told, ends = {"method": method, "progress": report}, subject.ends(over)
+    found = jc.orbits.synchronous_orbits(subject.model, *ends, **length, **told)
+    between, loss = f"within {subject.over(*ends)}", jc.unstable_ranges(found)
     if not found.branches:
         jc.show.require_some(found.sweep, f" {between}")
         what = f"No simulation {between} settled on a synchronous orbit"

@@ -131,7 +131,7 @@ class Subject:
         """
         low, high, count = self.rpm(over.first, "first"), self.rpm(over.last, "last"), over.count or count
         if count > 1 and high <= low:
-            between = f"{low:g} to {high:g} rpm of the {self.own}"
+            between = self.over(jc.rpm(low), jc.rpm(high))
             raise InputError(f"Option --last must be above --first, but the range is {between}.")
         return jc.rpm(low, high, count)
 

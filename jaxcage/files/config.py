@@ -149,7 +149,7 @@ def _build(part: Part, start: Any, path: tuple[str, ...]) -> eqx.Module:
     try:
         return kind(**fields_from(kind, arguments))
     except ValueError as error:
-        raise ConfigError(f"Table `{'.'.join(path) or 'top level'}`: {error}") from error
+        raise ConfigError(f"Table `{'.'.join(path)}`: {error}" if path else str(error)) from error
 
 
 _READY_MADE: dict[str, Callable[[Any], eqx.Module]] = {

@@ -17,7 +17,8 @@ SIGMAS = 3.0
 """Standard deviations from the best value to either end of a tolerance."""
 _LEFT = re.compile(rf"\s*(?:({NUMBER})\s*\()?\s*({NUMBER})\s*(.*?)\s*")
 _RIGHT = re.compile(rf"\s*({NUMBER})\s*(\))?\s*(.*?)\s*")
-_TOLERANCE = re.compile(r"\+-|±")
+_TOLERANCE = re.compile(r"\+/?-|±")
+_LEADING = re.compile(rf"\s*{NUMBER}\s*")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,7 +74,9 @@ def read_range(text: str, unit: str) -> Range:
     if _TOLERANCE.search(text):
         if unit == "K":
             raise ValueError(f'is "{printable(text)}": a temperature is given by its ends, such as "40 .. 60 degC"')
-        middle, half = (to_si(part.strip(), unit) for part in _TOLERANCE.split(text, 1))
+        parts = _TOLERANCE.split(text, 1)
+        named = [_LEADING.sub("", part, count=1) for part in parts]  # a unit that only one names is that of both
+        middle, half = (to_si((part if own else part + max(named)).strip(), unit) for part, own in zip(parts, named))
         ends, best, is_normal = (middle - half, middle + half), middle, True
     else:
         left, _, right = text.partition("..")

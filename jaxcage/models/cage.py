@@ -180,7 +180,7 @@ class CageModel(AbstractForcedSystem):
         radial = self.bearing.radial_clearance
         if is_concrete(radial) and np.any(np.asarray(radial) < 0):
             said = "must be at least 0 for a cage model, whose rollers are not preloaded (a whole bearing's can be)"
-            raise ArgumentError("radial_clearance", said=f"{said}, but is {1e6 * float(np.min(radial)):g} um.")
+            raise ArgumentError("bearing.radial_clearance", said=f"{said}, but is {1e6 * float(np.min(radial)):g} um.")
         clearance = self.clearance
         for name, length in (("contact", self.contact.smoothing), ("film", self.film.smoothing)):
             if is_concrete(length, clearance) and np.any(np.asarray(length) > SMOOTHEST * np.asarray(clearance)):
