@@ -260,11 +260,14 @@ def test_tolerances_are_met_at_their_worst_corner():
     assert {b.name: (b.width, round(b.factor, 2)) for b in found.budget} == {"x": (0.04, 1.0), "y": (0.06, 1.0)}
 
 
-def test_a_tolerance_to_one_side_may_be_as_wide_as_its_end_allows():
-    """x is at its bound, and x + 0.04 may be up to 1.08."""
-    found = designed(vary=VARY | {"x": (0.7, 1.0)}, tolerance={"x": Tolerance(0.0, 0.04)})
+@pytest.mark.parametrize(
+    "ends, factor, limit", [((0.0, 0.04), 2.0, LOWER), ((0.02, 0.04), 3.0, LOWER), ((0.0, 0.01), 4.0, "")]
+)
+def test_a_tolerance_to_one_side_may_be_as_wide_as_its_end_allows(ends, factor, limit):
+    """x is at its bound, its upper end may be up to 1.08, and more than four times the width is not tried."""
+    found = designed(vary=VARY | {"x": (0.7, 1.0)}, tolerance={"x": Tolerance(*ends)})
     (row,) = found.budget
-    assert (row.width, row.limit) == (0.04, LOWER) and row.factor == pytest.approx(2.0, rel=1e-3)
+    assert (row.width, row.limit) == (ends[1] - ends[0], limit) and row.factor == pytest.approx(factor, rel=1e-3)
 
 
 def test_a_search_whose_tolerances_allow_no_stable_orbit():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxcage.bearing import catalogue, listed, listed_like, nu2310, static_load_rating
-from jaxcage.show import minimum_load_notes
+from jaxcage.show import limiting_speed_notes, minimum_load_notes
 
 
 @pytest.mark.parametrize("name", catalogue())
@@ -53,6 +53,13 @@ def test_makers_rules_beside_a_computed_slip():
     assert len(notes(1000.0, 0.5)) == len(notes(2000.0, 0.01)) == len(notes(4450.0, 0.01)) == 1
     assert "slip of the cage is 1.00%, although the load is below all" in notes(1000.0, 0.01)[1]
     assert "slip of the cage is 5.00%, although the load is above all" in notes(4450.0, 0.05)[1]
+
+
+def test_a_speed_beyond_the_makers_limit_is_named():
+    """SKF's catalogue of 2018 prints 8 000 rpm for NU 2310 with its usual cage."""
+    assert limiting_speed_notes(nu2310(), 8000.0) == []
+    (note,) = limiting_speed_notes(nu2310(), 9000.0)
+    assert "limits NU2310 to 8000 rpm of the shaft, 12000 rpm with a one-piece brass cage" in note
 
 
 def test_an_unknown_designation_is_refused():

@@ -83,10 +83,10 @@ def check(
         over = subject.over(*checked.speeds_rpm[[0, -1]] / RPM)
         document = {"verdict": checked.state, "checked": checked}
         found = Answer(jc.show.range_sentence(over, checked), notes=[f"Checked: {checked}"], document=document)
-    model = 'The cage model prescribes the impacts of the rollers; slip and forces: a file with model = "bearing"'
     document = {"operating_rpm": [end * RPM for end in ends], **found.document}
     table, largest = _forces(subject, ends)
-    said, notes = f"{found.sentence} {margin}", [largest, *found.notes, model]
+    limit = jc.show.limiting_speed_notes(subject.model.bearing, ends[1] * RPM * (subject.shaft or 1.0))
+    said, notes = f"{found.sentence} {margin}", [*limit, largest, *found.notes, jc.show.BY_CAGE_MODEL]
     return dataclasses.replace(found, sentence=said, tables=[*tables, table], notes=notes, document=document)
 
 
@@ -106,7 +106,9 @@ def _with_rollers(subject: Subject, ends: tuple[float, float]) -> Answer:
     """The verdict for a bearing with its rollers: the motion of its cage, its slip, and the makers' minimum load."""
     found = jc.sweep(subject.model, np.linspace(*ends, SPEEDS), **LENGTH, progress=partial(report_lanes, "simulations"))
     jc.show.require_some(found)
-    notes = jc.show.minimum_load_notes(subject.model.bearing, float(subject.model.load), ends[1] * RPM)
+    bearing, shaft, slip = subject.model.bearing, ends[1] * RPM, float(found["cage_slip"][-1].mean())
+    notes = jc.show.limiting_speed_notes(bearing, shaft)
+    notes += jc.show.minimum_load_notes(bearing, float(subject.model.load), shaft, slip if np.isfinite(slip) else None)
     notes += [f"{jc.show.MOTIONS[name]}: {words}" for name, words in jc.show.MOTION_WORDS.items()]
     notes.append("The motion is that of the cage: rollers that rattle in their pockets do not count")
     notes.append(
@@ -169,6 +171,8 @@ def report(
     if operating is not None:
         parts.append(("Verdict", check(subject, operating=operating, draws=draws)))
         subject, at = subject.operating(operating)
+        if over == o.Range(count=over.count):  # neither end was given
+            low, high = (reach * end for reach, end in zip(jc.design.REACH, at, strict=True))
         low, high = min(low, at[0]), max(high, at[1])
         words += ["--operating", f"{operating[0]:g}-{operating[1]:g} rpm {subject.speeds}"]
     elif subject.unknowns and draws:

@@ -139,7 +139,7 @@ def _calm_design(
     what = {"cost": "Cost", "width": "Width of the unstable ranges [rpm]"}[calm.objective]
     notes = [*notes, f"{what}: {best.cost_before:.4g} before, {best.cost:.4g} after"]
     notes += [f"10 % stricter {name}: costs {price:.2g} more" for name, price in jc.show.stricter(best).items()]
-    notes += [f"On the way: {note}" for note in best.notes]
+    notes += [f"On the way: {note}" for note in best.notes] + [jc.show.BY_CAGE_MODEL]
     notes += [] if best.checked is None else [f"Checked: {best.checked} ({best.checked.method})"]
     notes.append(f"Designs solved for: {best.evaluations}")
     names = ("verdict", "checked", "cost", "cost_before", "prices", "conflict", "at_bound")

@@ -17,7 +17,7 @@
 
 from .._arguments import check_layer
 from .design_space import DesignSpace as DesignSpace, Value as Value
-from .operating import OperatingRange as OperatingRange
+from .operating import REACH as REACH, OperatingRange as OperatingRange
 from .optimiser import SEARCHES as SEARCHES, Design as Design, design_for as design_for
 from .requirements import (
     Price as Price,

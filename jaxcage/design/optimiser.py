@@ -428,6 +428,7 @@ def _budget(problem: Problem, trial: Trial) -> list[Budget]:
                 reached = factor
                 break
             limit = made if isinstance(made, str) else broken[0].name
+        limit = "" if reached == WIDEST else limit
         rows.append(Budget(name, upper - lower, reached, limit))
     return rows
 

@@ -110,6 +110,7 @@ from .slope_tables import (
 from .style import drawn as drawn, legend_below as legend_below, new_figure as new_figure
 from .tables import Column as Column, Table as Table, counted as counted, shares_table as shares_table, table as table
 from .verdict_tables import (
+    BY_CAGE_MODEL as BY_CAGE_MODEL,
     MOTION_WORDS as MOTION_WORDS,
     MOTIONS as MOTIONS,
     cage_verdict as cage_verdict,
@@ -118,6 +119,7 @@ from .verdict_tables import (
     forces_table as forces_table,
     indices_note as indices_note,
     indices_table as indices_table,
+    limiting_speed_notes as limiting_speed_notes,
     margin_sentence as margin_sentence,
     margins_table as margins_table,
     minimum_load_notes as minimum_load_notes,

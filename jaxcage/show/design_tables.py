@@ -79,7 +79,8 @@ def budget_of_tolerances_table(model: Any, found: Design) -> Table:
     ]
     idle, title = max(found.budget, key=lambda each: each.factor), "Tolerances, from end to end"
     if idle.factor > IDLE:
-        title += f": that of {idle.name.replace('_', ' ')} buys nothing, it may be {idle.factor:.2g} times as wide"
+        times = f"{idle.factor:.2g} times" if idle.limit else f"at least {idle.factor:.2g} times"
+        title += f": that of {idle.name.replace('_', ' ')} buys nothing, it may be {times} as wide"
     widths = [Column(name, unit=OWN) for name in ("width", "may be")]
     return table(title, rows, ["parameter", UNIT, *widths, "limited by"], "budget")
 

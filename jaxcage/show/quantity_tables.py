@@ -46,7 +46,9 @@ def head_of(name: str, unit: str) -> str:
 
 
 def quantity_words(quantity: Quantity, value: float) -> str:
-    """A quantity in a sentence, such as `friction power 1187 W`."""
+    """A quantity in a sentence, such as `friction power 1187 W` or `cage slip 2.1 %`."""
+    if quantity.name in SHARES:
+        return f"{head_of(quantity.name, '1')} {100 * value:.2g} %"
     return f"{head_of(quantity.name, quantity.unit)} {value:.4g} {quantity.unit}".removesuffix(" 1")
 
 

@@ -129,6 +129,7 @@ def indices_note(rows: Sequence[Index]) -> str:
 
 MOTIONS = {"locally_periodic": "calm", "circular": "circling", "disordered": "rattling"}
 """Plain words for the motions of a cage among its rollers, by the names of `jaxcage.analysis.motion_label`."""
+BY_CAGE_MODEL = 'The cage model prescribes the impacts of the rollers; slip and forces: a file with model = "bearing"'
 MOTION_WORDS = {
     "locally_periodic": "a revolution later the centre of the cage is within a tenth of the clearance of where it was",
     "circular": "the centre whirls around the guide at an almost constant distance from the middle",
@@ -187,8 +188,20 @@ READ = "cage_slip", "pocket_force_max_N", "friction_power_W"
 """Variables of a data set that `motion_table` shows."""
 
 
+BRASS_CAGE = 1.5
+"""Limiting speed with a one-piece brass cage over that with the usual one (SKF, Rolling bearings, 2018, table 7)."""
 SKIDS = 0.02
 """Slip of the cage from which a bearing is said to skid."""
+
+
+def limiting_speed_notes(bearing: Any, shaft_rpm: float) -> list[str]:
+    """A note if a speed of the shaft exceeds the limiting speed of the bearing in the catalogue."""
+    like = listed_like(bearing)
+    if like is None or not shaft_rpm > like.limiting_rpm:
+        return []
+    brass = f"{BRASS_CAGE * like.limiting_rpm:.0f} rpm with a one-piece brass cage"
+    said = f"SKF limits {like.designation} to {like.limiting_rpm:.0f} rpm of the shaft, {brass}"
+    return [f"{said}; the range reaches {shaft_rpm:.0f} rpm"]
 
 
 def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float, slip: float | None = None) -> list[str]:
