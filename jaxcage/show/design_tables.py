@@ -6,6 +6,7 @@ from typing import Any
 
 from .._parameters import parameter_info, parameters
 from ..design import BeforeAfter, Design, Optimum, Requirement, SobolIndices, ToleranceBudget, Value
+from .quantity_tables import head_of
 from .tables import OWN, UNIT, Beside, Column, Table, speed_columns, table
 
 
@@ -89,12 +90,12 @@ def before_and_after_table(title: str, rows: Sequence[BeforeAfter]) -> Table:
     """Table of statistics before and after with their standard errors, and of their relative changes."""
     share = lambda row, value: value / abs(row.before) if row.before and math.isfinite(value) else None
     records = [
-        vars(row) | {"known": row.known, "share": share(row, row.change), "share_error": share(row, row.change_error)}
+        vars(row) | {"measure": head_of(row.name, row.unit), "known": row.known, "share": share(row, row.change), "share_error": share(row, row.change_error)}
         for row in rows
     ]
     columns = [Column(when, unit=OWN, error=f"{when}_error") for when in ("before", "after")]
     columns.append(Column("change", "share", shown="%", error="share_error"))
-    return table(title, records, [Column("measure", "name"), UNIT, *columns], "before_and_after")
+    return table(title, records, [Column("measure"), UNIT, *columns], "before_and_after")
 
 
 def sobol_table(title: str, shares: SobolIndices) -> Table:
