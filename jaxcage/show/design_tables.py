@@ -90,7 +90,9 @@ def before_and_after_table(title: str, rows: Sequence[BeforeAfter]) -> Table:
     """Table of statistics before and after with their standard errors, and of their relative changes."""
     share = lambda row, value: value / abs(row.before) if row.before and math.isfinite(value) else None
     records = [
-        vars(row) | {"measure": head_of(row.name, row.unit), "known": row.known, "share": share(row, row.change), "share_error": share(row, row.change_error)}
+        vars(row)
+        | {"measure": head_of(row.name, row.unit), "known": row.known}
+        | {"share": share(row, row.change), "share_error": share(row, row.change_error)}
         for row in rows
     ]
     columns = [Column(when, unit=OWN, error=f"{when}_error") for when in ("before", "after")]
