@@ -4,6 +4,8 @@
 with this library. "Planted" systems have orbits and multipliers that are known exactly.
 """
 
+from pathlib import Path
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -14,6 +16,7 @@ from laws import double_well, hardening, numbers
 from literature import DUFFING_DOUBLINGS, DUFFING_FOLDS
 
 import jaxcage as jc
+from jaxcage.files import read_bearing
 
 
 METHOD = jc.method("rodas4", steps=256)
@@ -30,6 +33,20 @@ def kinds(branch):
 def over_speed():
     orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), revolutions=200, method=METHOD)
     return jc.branch(hardening(), orbit, lower=0.5, upper=2.5, method=METHOD)
+
+
+@pytest.mark.wide
+def test_an_orbit_for_which_runge_kutta_takes_thousands_of_steps_has_a_branch():
+    """Thick oil in a narrow gap: Rodas4 follows it, and passes through the state that 8192 steps find."""
+    spindle = read_bearing(Path(__file__).parents[1] / "benchmarks" / "spindle.toml").model
+    values = dict(guidance_gap=154.27e-6, eccentricity=6.454e-6, temperature=303.86, land_width=1.5974e-3)
+    values |= dict(cage_mass=0.21563, rib_diameter=70.34e-3, amplitude=150.58, stiffness=3.1655e9)
+    model, speed = jc.replace(spindle, **values), 420.5
+    orbit = jc.periodic_orbit(model, speed, guess=(-5.767e-5, -2.489e-5, 7.371e-3, -4.06e-3))
+    assert bool(orbit.converged) and orbit.solver == "rk4" and int(orbit.steps) >= 4096
+    found = jc.branch(model, orbit, lower=420.0, upper=421.0, steps=jc.orbits.StepControl(most=8))
+    apart = np.abs(found.state - np.asarray(orbit.state)).max(axis=1) / float(model.clearance)
+    assert apart[np.argmin(np.abs(found.value - speed))] < 1e-3
 
 
 def test_speed_and_periods_given_beside_an_orbit_count():

@@ -5,6 +5,7 @@ followed from the nearest design at which they are known. The orbits between are
 and their worst value over speed counts. Its gradient is that at fixed speed (the envelope theorem).
 """
 
+import contextlib
 import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -16,7 +17,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.optimize import minimize_scalar
 
-from .._errors import InputError
+from .._errors import ArgumentError, InputError
 from .._pytrees import compiled
 from ..analysis import land_reading
 from ..orbits import (
@@ -402,8 +403,10 @@ class OperatingRange(_AroundEdges):
         key = np.asarray(place).tobytes()
         if key not in self._through:
             orbit, (low, high) = self._orbit(place), self.wider
-            inside = orbit is not None and low < float(orbit.speed) < high
-            self._through[key] = Through.of(self.space, place, orbit, low, high) if orbit and inside else None
+            self._through[key] = None
+            if orbit is not None and low < float(orbit.speed) < high:
+                with contextlib.suppress(ArgumentError):  # the branch through the orbit cannot be followed
+                    self._through[key] = Through.of(self.space, place, orbit, low, high)
         return self._through[key]
 
     def _between(self, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> tuple[np.ndarray, np.ndarray]:

@@ -120,6 +120,9 @@ def follow_both_ways(
     """
     problem = problem.around(guesses[0][1]).with_stable_steps(guesses[0])
     first = problem.orbits_near(guesses)
+    if problem.counts.chooses and not np.any(first.converged):  # Runge-Kutta may need too many steps
+        problem = problem.by_rodas4()
+        first = problem.orbits_near(guesses)
     count = len(guesses)
     taken = ~first.converged
     unstable = [0] * (2 * count)
