@@ -80,7 +80,7 @@ def test_an_exponent_on_a_soft_support_is_that_of_the_motion():
 @pytest.mark.parametrize("wide", [False, True])
 def test_errors_of_successful_lanes_are_stated_and_within_the_tolerance(wide):
     finished = 0
-    for seed in range(3):
+    for seed in range(3, 6):
         drawn = reference.random_model(seed, wide)
         same = [n for n in jc.parameters(MODEL) if n in jc.parameters(drawn)]
         model = jc.replace(MODEL, **{n: jc.parameters(drawn)[n] for n in same})
@@ -108,7 +108,7 @@ def test_the_first_transient_of_a_light_cage_in_thick_oil_is_passed():
 
 @pytest.mark.wide
 def test_a_hopeless_design_leaves_its_neighbours_as_they_are():
-    designs = [MODEL, beyond_range(MODEL, stiffness=1e20, onset=0.3), replaced(eccentricity=2e-5)]
+    designs = [MODEL, beyond_range(MODEL, stiffness=1e300, onset=0.3), replaced(eccentricity=2e-5)]
     speeds = jc.rpm(9000, 15000, 2)
     initial_states = [(0.6 * float(MODEL.clearance), 0.0, 0.0, 0.0)]
     beside = jc.sweep(designs, speeds, initial_states=initial_states, **SHORT)
