@@ -218,6 +218,18 @@ def test_chaos_that_lasts_and_chaos_that_dies_out_make_zones_of_their_own():
     assert jc.zones(sweep, close_below_rpm=0.0).transient == ()
 
 
+def test_a_window_that_no_speed_makes_certain_is_closed():
+    """Of 20 lanes at the five speeds in the middle 14 leave chaos late, or all of them soon."""
+    sweep = made("11###########11", initial_states=20)
+    sweep = sweep.isel(initial_state=np.zeros(20, dtype=int))
+    for leaving, at, count in ((14, 1520.0, 1), (20, 320.0, 2)):
+        escape = np.full(sweep["label"].shape, 20.0)
+        escape[2:13] = np.inf
+        escape[5:10, :leaving] = at
+        later = followed(sweep, escape, 3020)
+        assert not lasting(later)[6:9].any() and len(jc.zones(later, close_below_rpm=0.0).zones) == count
+
+
 def test_an_edge_is_no_more_certain_than_the_mean_lives_next_to_it():
     """Lanes that leave chaos at the first two speeds of a zone: none; 12 of 20, late; all of them, soon."""
     sweep = made("111####11", initial_states=20)

@@ -135,12 +135,18 @@ def runs(mask: Bool[np.ndarray, " speeds"]) -> list[tuple[int, int]]:
 
 
 def close_windows(
-    rpm: np.ndarray, chaotic: Bool[np.ndarray, " speeds"], close_below_rpm: float
+    rpm: np.ndarray,
+    chaotic: Bool[np.ndarray, " speeds"],
+    undecided: Bool[np.ndarray, " speeds"],
+    close_below_rpm: float,
 ) -> list[tuple[int, int]]:
-    """Runs of chaotic speeds, joined if the distance from the last to the next is less than `close_below_rpm`."""
+    """Runs of chaotic speeds, joined if the distance from the last to the next is less than `close_below_rpm`, or every
+    speed between is undecided."""
     joined: list[tuple[int, int]] = []
     for first, last in runs(chaotic):
-        if joined and rpm[first] - rpm[joined[-1][1]] < close_below_rpm * (1 - 1e-9):  # rounding of the grid
+        before = joined[-1][1] if joined else first
+        near = rpm[first] - rpm[before] < close_below_rpm * (1 - 1e-9)  # rounding of the grid
+        if joined and (near or np.all(undecided[before + 1 : first])):
             first = joined.pop()[0]
         joined.append((first, last))
     return joined
@@ -208,7 +214,8 @@ def zones(sweep: xr.Dataset, close_below_rpm: float | None = None) -> Zones:
     neither inside nor outside a zone, and the uncertainty of an edge next to them is the width of the gap.
 
     **Arguments:** result of `sweep` for one model, with at least one exponent; width of the windows to be closed [rpm],
-    by default 500 rpm and at most 5 % of the highest speed.
+    by default 500 rpm and at most 5 % of the highest speed. A window is also closed if no speed in it is surely outside
+    a zone.
 
     **Returns:** `Zones`. Edges lie half way between neighbouring speeds. Their uncertainty is the spacing or, if
     larger, the distance to the first speed on either side at which the interval of the mean life (95 %) excludes the
@@ -221,7 +228,7 @@ def zones(sweep: xr.Dataset, close_below_rpm: float | None = None) -> Zones:
     met = _Speeds(synchronous | sound, np.zeros_like(sound), np.mean(label == "periodic-1", axis=1))
     chaos = _Speeds(chaotic | sound, _undecided(sweep, chaotic), chaotic_share(sweep))
     return Zones(
-        _zones(sweep, chaos, close_windows(rpm, lasts, close_below_rpm), "chaotic"),
+        _zones(sweep, chaos, close_windows(rpm, lasts, chaos.undecided, close_below_rpm), "chaotic"),
         _zones(sweep, met, runs(synchronous), "synchronous"),
         resolution_rpm(sweep),
         close_below_rpm,
