@@ -189,7 +189,7 @@ class CageModel(AbstractForcedSystem):
                     f"{name}.smoothing",
                     said=f"must be at most a tenth of the clearance, {room:g} mm, but is {given:g} mm.",
                 )
-        motion = lambda tau, y, w: Motion(tau, *y, w, 0.0, self.bearing.shaft_speed(w), self._land)
+        motion = lambda tau, y, w: Motion(tau, y[0], y[1], y[2], y[3], w, 0.0, self.bearing.shaft_speed(w), self._land)
         for law in self.extra:
             force = lambda tau, y, w, law=law: law.at(self, w).force(motion(tau, y, w))
             require_repeats(f"Force `{type(law).__name__}`", force, [(tuple(clearance * np.array(SOMEWHERE)),)])
