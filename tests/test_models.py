@@ -88,9 +88,9 @@ def test_strobe_map_derivatives_match_finite_differences(name: str):
 
 @pytest.mark.wide
 def test_stiff_heavy_rib_is_the_rigid_rib():
-    """Same cage, rib on a spring of 1e10 N/m: the strobe state agrees to the rib's static deflection."""
+    """Same cage, rib on a spring of 1e12 N/m: the strobe state agrees to the rib's static deflection."""
     model, speed = helpers.preliminary("1a"), jnp.asarray(1500.0)
-    held = helpers.elastic(model, mass=50.0, stiffness=1e13, damping=1e5)
+    held = helpers.elastic(model, mass=50.0, stiffness=1e12, damping=1e5)
     rigid, moving = revolve(model, speed, state(model, 1500.0)), revolve(held, speed, state(held, 1500.0))
     cage = np.asarray(moving)[[0, 1, 4, 5]]
     scale = np.array([float(c) for c in model.scale(speed)])
