@@ -163,7 +163,7 @@ class BearingAtSpeed(AbstractField):
         return cos * table_cos - sin * table_sin, sin * table_cos + cos * table_sin
 
     def on_roller(self, rollers: Rollers, cage: Bodies, pocket_cos: Scalar, pocket_sin: Scalar) -> Forces:
-        """Every contact of one roller, of whom alone `rollers` are, by elementary operations."""
+        """Every contact of one roller, that of `rollers`, by elementary operations."""
         g = self.geometry(rollers, cage, pocket_cos, pocket_sin)
         across = rollers.radius * rollers.orbit
         ring_out = cage.ring_vx * g.cos + cage.ring_vy * g.sin
