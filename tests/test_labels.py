@@ -219,7 +219,7 @@ def test_chaos_that_lasts_and_chaos_that_dies_out_make_zones_of_their_own():
 
 
 def test_a_window_that_no_speed_makes_certain_is_closed():
-    """Of 20 lanes at the five speeds in the middle 14 leave chaos late, or all of them soon."""
+    """At the five speeds in the middle 14 of 20 lanes leave chaos late, or all of them leave it soon."""
     sweep = made("11###########11", initial_states=20)
     sweep = sweep.isel(initial_state=np.zeros(20, dtype=int))
     for leaving, at, count in ((14, 1520.0, 1), (20, 320.0, 2)):

@@ -416,7 +416,7 @@ def _budget(problem: Problem, trial: Trial) -> list[Budget]:
             continue
         lower, upper = tolerance[name].lower, tolerance[name].upper
         slope = trial.slack_slope[:, i] / space.span[i]
-        takes = np.abs(slope * (np.where(slope > 0, lower, upper) - tolerance[name].least))
+        takes = np.abs(slope * (np.where(slope > 0, lower, upper) - tolerance[name].fixed))
         room = np.divide(np.maximum(trial.slack, 0.0), takes, out=np.full(takes.size, np.inf), where=takes > 0)
         k, reached = int(np.argmin(room)), 1.0
         limit = problem.wanted[k].name if np.isfinite(room[k]) else ""

@@ -144,13 +144,14 @@ class Tolerance(NamedTuple):
         return cls(0.0, 1e-3 * grade / speed, absolute=True)
 
     @property
-    def least(self) -> float:
-        """Where a wider tolerance stays: the nominal value, or the end nearest to it; the lower end if `absolute`."""
+    def fixed(self) -> float:
+        """Return the deviation that stays when the tolerance is widened: 0, or the end nearest to it if 0 is not within
+        the tolerance; if `absolute`, the lower end."""
         return self.lower if self.absolute else min(max(0.0, self.lower), self.upper)
 
     def times(self, factor: float) -> "Tolerance":
-        """Tolerance wider by a factor on both sides of `least`."""
-        wider = lambda end: self.least + factor * (end - self.least)
+        """Tolerance wider by a factor on both sides of `fixed`."""
+        wider = lambda end: self.fixed + factor * (end - self.fixed)
         return self._replace(lower=wider(self.lower), upper=wider(self.upper))
 
     def ends(self, value: float) -> tuple[float, float]:
