@@ -18,7 +18,7 @@ COMMON = {
     "film.land_width": '"2.5 mm"',
 }
 CAGE = COMMON | {"guidance_gap": '"0.25 mm +- 0.05 mm"'}
-BRASS = COMMON | {"guidance_gap": '"0.25 mm"', "drag.rolling_coefficient": "1.12e-6"}
+BRASS = COMMON | {"guidance_gap": '"0.25 mm"'}
 PEEK = {"material": '"PEEK-GF30"'}
 INNER = {"guidance": '"inner"\ninner_land_diameter = "83.5 mm"'}
 """Values that are edited in the templates, with their tables; mass and bars of the cage follow from its material."""

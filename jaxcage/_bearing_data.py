@@ -72,6 +72,15 @@ def clearances(sizes: Mapping[str, float]) -> dict[str, float]:
     return found
 
 
+ROLLING = {"2": 1.09e-6, "3": 1.09e-6, "10": 1.12e-6, "20": 1.23e-6, "22": 1.40e-6, "23": 1.48e-6}
+"""Series of cylindrical roller bearings -> R_1 of the rolling resistance; source in `bearing.oil_drag`."""
+
+
+def rolling_coefficient(designation: str) -> float:
+    """R_1 of SKF's rolling resistance for a bearing of the catalogue, from the series in its designation."""
+    return ROLLING[designation.rstrip("ABCDEFGHIJKLMNOPQRSTVWXYZ")[2:-2]]
+
+
 def estimated(designation: str) -> tuple[str, ...]:
     """Parameters of a bearing of the catalogue that nobody prints; those of the paper's bearing are in the paper."""
     if designation == "NU2310":
@@ -92,6 +101,8 @@ class CageMaterial(NamedTuple):
     """Coefficient of friction of the oiled material on steel."""
     limit: float
     """Highest temperature [K]."""
+    hardness: float
+    """Indentation hardness [Pa]."""
 
 
 @functools.cache
@@ -99,8 +110,8 @@ def cage_materials() -> dict[str, CageMaterial]:
     """Materials of cages by name."""
     found = {}
     for row in _table("cage_materials.csv"):
-        density, modulus, friction, limit = (float(row[k]) for k in ("density", "youngs_modulus", "friction", "limit"))
-        found[row["name"]] = CageMaterial(row["name"], density, 1e9 * modulus, friction, limit + 273.15)
+        density, modulus, friction, limit, hardness = (float(row[k]) for k in list(row)[1:])
+        found[row["name"]] = CageMaterial(row["name"], density, 1e9 * modulus, friction, limit + 273.15, 1e9 * hardness)
     return found
 
 

@@ -104,6 +104,20 @@ def test_every_parameter_and_choice_of_a_bearing_goes_there_and_back(tmp_path: P
     assert configuration(again) == configuration(model)
 
 
+@pytest.mark.parametrize(
+    ("name", "material", "rolling", "hardness"),
+    [("NU1014", "steel", 1.12e-6, 1.6e9), ("NU2212 ECP", "peek", 1.40e-6, 0.25e9)],
+)
+def test_rolling_resistance_follows_the_series_and_hardness_the_material(name, material, rolling, hardness):
+    """R_1 of SKF by series, unless the file gives its own; the hardness enters the wear."""
+    table = tomllib.loads(template("bearing", short=True)) | {"material": material, "bearing": {"designation": name}}
+    found = model_from(table | {"film": {"land_width": "2 mm"}})
+    assert (found.drag.rolling_coefficient, found.wear.hardness) == (rolling, pytest.approx(hardness))
+    own = {"drag": table["drag"] | {"rolling_coefficient": 2e-6}, "wear": {"hardness": "1 GPa"}, "base": "nu2310"}
+    found = model_from({"base": "nu2310", "material": material} | own)
+    assert (found.drag.rolling_coefficient, found.wear.hardness) == (2e-6, 1e9)
+
+
 def test_what_a_file_changes_of_a_ready_made_bearing(tmp_path: Path):
     path = tmp_path / "mine.toml"
     path.write_text(

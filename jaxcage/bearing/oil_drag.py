@@ -58,8 +58,7 @@ def rolling_moment(
 ) -> Array:
     """SKF's moment of rolling resistance M_rr of a cylindrical roller bearing [N m].
 
-    **Arguments:** as `rolling_factors`, with the radial load [N], and R_1: 1.09e-6 of series 2 and 3, 1.12e-6 of 10,
-    1.23e-6 of 20, 1.40e-6 of 22, 1.48e-6 of 23.
+    **Arguments:** as `rolling_factors`, with the radial load [N], and R_1, which follows from the series.
     """
     diameter = 1e3 * (bearing.bore + bearing.outside_diameter) / 2
     flow = 1e6 * viscosity * jnp.abs(speed) * 30 / jnp.pi

@@ -122,6 +122,7 @@ def _filled(root: Part, material: CageMaterial, start: Any) -> Part:
         own = {"cage_inertia": own["cage_mass"] * body.gyration, **own}
         stiffness = pocket_stiffness(bearing, gap, modulus)
         below["pockets"] = {"pocket_stiffness": stiffness, "pocket_friction": material.friction}
+        below["wear"] = {"hardness": material.hardness}
     elif "impact" in parts and parts["impact"].module == ImpactFromBearing.__name__:
         below["impact"] = {"cage_modulus": modulus}
     for name, made in below.items():

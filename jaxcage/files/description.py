@@ -16,7 +16,15 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from .._allowed import ParameterInfo, allowed as must_be, must_be_given, within
-from .._bearing_data import CageMaterial, cage_material, cage_speed_ratio, clearances, designated, estimated
+from .._bearing_data import (
+    CageMaterial,
+    cage_material,
+    cage_speed_ratio,
+    clearances,
+    designated,
+    estimated,
+    rolling_coefficient,
+)
 from .._errors import ConfigError
 from .disk import read_bytes
 from .plausibility import check_numbers
@@ -37,6 +45,7 @@ BY_MATERIAL = {
         "cage_inertia": "cage_inertia",
         "pocket_stiffness": "pockets.pocket_stiffness",
         "pocket_friction": "pockets.pocket_friction",
+        "hardness": "wear.hardness",
     },
 }
 """Values that the material of the cage gives where a file does not, with their dotted names."""
@@ -152,7 +161,7 @@ def describe(table: Mapping[str, Any]) -> Description:
     material = _listed("material", table["material"], cage_material, "PEEK-GF30") if "material" in table else None
     made = {} if material is None else BY_MATERIAL[subject]
     if made and subject == "bearing":
-        rest = {"pockets": {}} | rest
+        rest = {"pockets": {}, "wear": {}} | rest
     root = _checked(module, rest, base is not None, (), ranges, speeds, tuple(made))
     if base is None and root.values.get("guidance") == "inner" and "inner_land_diameter" not in rest:
         raise ConfigError('`inner_land_diameter` must be given with guidance = "inner".')
@@ -161,7 +170,10 @@ def describe(table: Mapping[str, Any]) -> Description:
     if bearing is not None:
         names = bearing.values if bearing.ready_made is None else estimated(bearing.ready_made[1])
         guessed = tuple(f"bearing.{name}" for name in names if name not in rest["bearing"])
-    guessed += tuple(where for name, where in made.items() if name not in {**rest, **rest.get("pockets", {})})
+        if bearing.ready_made and (drag := root.parts.get("drag")):
+            drag.values.setdefault("rolling_coefficient", rolling_coefficient(bearing.ready_made[1]))
+    own = {**rest, **rest.get("pockets", {}), **rest.get("wear", {})}
+    guessed += tuple(where for name, where in made.items() if name not in own)
     found = Description(subject, base, speeds, root, ranges, table, guessed, material)
     if isinstance(given := root.values.get("eccentricity"), Balance):
         cage, n = given.speed, found.numbers

@@ -17,7 +17,7 @@ SHOWN = {"m^2/s": ("mm²/s", 1e6, 0.0), "K": ("°C", 1.0, -273.15), "Pa": ("GPa"
 READY_MADE = {("bearing", "designation"): "catalogue, {}", ("lubricant", "grade"): "grade {}"}
 BY_MATERIAL = {
     *(("cage_mass",), ("cage_inertia",), ("impact", "cage_modulus")),
-    *(("pockets", "pocket_stiffness"), ("pockets", "pocket_friction")),
+    *(("pockets", "pocket_stiffness"), ("pockets", "pocket_friction"), ("wear", "hardness")),
 }
 """Paths of parameters that follow from the material of the cage."""
 PUBLISHED = {
@@ -102,6 +102,8 @@ def _in_file(path: tuple[str, ...], table: Mapping[str, Any], given: Any) -> str
     if "material" in table and path in BY_MATERIAL:
         return f"material {table['material']}"
     part = table.get(path[0])
+    if path == ("drag", "rolling_coefficient") and "designation" in table.get("bearing", {}):
+        return f"series of {table['bearing']['designation']}"
     for (made, key), words in READY_MADE.items():
         if path[0] == made and isinstance(part, Mapping) and key in part:
             return "default" if path[1:] == ("temperature",) else words.format(part[key])
