@@ -62,11 +62,14 @@ for path in sys.argv[1:]:
     print(main(["statics", path]), file=sys.stderr)
 print(sorted({"jax", "equinox"} & set(sys.modules)), file=sys.stderr)
 """
-OF_ANOTHER_KIND = {
+REFUSED = {
     "poincare nu2310 --speed 9000": "Command poincare takes a cage, but nu2310 is a bearing with its rollers.",
     "simulate 1a --speed 9000 --load 3": "Option --load goes with a bearing with its rollers, but 1a is a cage.",
     "gradient 1a --load 3": "Option --load goes with a bearing with its rollers, but 1a is a cage.",
     "compare 1a nu2310": "Case 'nu2310' must be a cage, as the first one is: two of a kind are compared.",
+    "sweep 1a --first 9000 --last 3000": "Option --last must be above --first, but the range is 9000 to 3000 rpm.",
+    "sweep 1a --first 1.500": 'but is "1.500": write 1500 or 1.5, whichever is meant.',
+    "check 1a --operating 1.500-3.600rpm": '"1.500-3.600rpm" is "1.500 rpm": write 1500 or 1.5, whichever is meant.',
     "identify 1a none.csv": 'with ranges, such as stiffness = "1e4 .. 1e6 N/m", but has none.',
 }
 
@@ -84,12 +87,12 @@ def test_wrong_files_are_refused_before_jax_is_loaded(tmp_path: Path):
     assert found[-3].startswith("Case '1c' is unknown: it must be one of 1a,")
 
 
-def test_cases_of_the_wrong_kind_are_refused_before_jax_is_loaded():
+def test_cases_of_the_wrong_kind_and_wrong_speeds_are_refused_before_jax_is_loaded():
     script = REFUSALS.replace('["statics", path]', "path.split()")
-    command = [sys.executable, "-c", script, *OF_ANOTHER_KIND]
+    command = [sys.executable, "-c", script, *REFUSED]
     found = subprocess.run(command, capture_output=True, text=True, check=True).stderr.splitlines()
-    assert found[-1] == "[]" and found[1:-1:2] == ["2"] * len(OF_ANOTHER_KIND)
-    assert all(said.endswith(ends) for said, ends in zip(found[:-1:2], OF_ANOTHER_KIND.values(), strict=True))
+    assert found[-1] == "[]" and found[1:-1:2] == ["2"] * len(REFUSED)
+    assert all(said.endswith(ends) for said, ends in zip(found[:-1:2], REFUSED.values(), strict=True))
 
 
 def test_a_long_name_of_a_file_leaves_room_for_names_of_output_files(tmp_path: Path):

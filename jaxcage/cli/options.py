@@ -61,7 +61,8 @@ def read_quantity(given: str, unit: str) -> float:
     """Read a number in `unit` unless it names its own; a speed may say whether it is the shaft's or the cage's.
     **Raises:** `ValueError` whose message follows the option's name."""
     with contextlib.suppress(ValueError):
-        return float(given)
+        if unit != "rpm":  # `to_si` refuses 1.500 rpm
+            return float(given)
     if not unit:
         raise ValueError(f'must be a number, but is "{given}".')
     from ..files import read_rpm, to_si  # loads pint

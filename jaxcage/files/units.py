@@ -16,6 +16,8 @@ _NUMBER_AND_UNIT = re.compile(rf"\s*({NUMBER})\s*(.*?)\s*")
 _UNIT = re.compile(r"(?!\d(?!\s*/))[\w°µΩ%*/^().·⁻ +-]{1,60}")
 """Characters of a unit; pint ignores a comment, a colon or a line end, and the second number in "2 1 mm"."""
 _COMMA = re.compile(r"\s*[-+]?\d*,\d")
+_THOUSANDS = re.compile(r"\s*([1-9]\d{0,2}\.\d{3})\s*(?:rpm)?\s*")
+"""A speed whose point may separate thousands."""
 _DASH = re.compile(rf"\s*{_SIZE}(?:\s+[^\s\d]+)?\s+(?:-|–|to)\s+{_SIZE}")
 """Two numbers with a dash between them."""
 _TOWER = re.compile(r"[\d)]\s*(?:\^|\*\*)|\d{3}")
@@ -44,6 +46,9 @@ def to_si(text: str, unit: str) -> float:
     """
     if _COMMA.match(text):
         raise ValueError(f'is "{printable(text)}": numbers are written with a point and without commas')
+    if unit == "rpm" and (match := _THOUSANDS.fullmatch(text)):
+        speed = float(match[1])
+        raise ValueError(f'is "{printable(text)}": write {1000 * speed:.0f} or {speed:g}, whichever is meant')
     if _DASH.match(text):
         raise ValueError(f'is "{printable(text)}": a range is written with two points, such as "1e4 .. 1e6 N/m"')
     match = _NUMBER_AND_UNIT.fullmatch(text)
