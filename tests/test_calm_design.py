@@ -13,7 +13,7 @@ from helpers import wide_but
 from shooting import edge_speed, orbit, readings
 
 import jaxcage as jc
-from jaxcage.design import DesignSpace, OperatingRange, Price, Requirements, Tolerance
+from jaxcage.design import DesignSpace, OperatingRange, Price, Requirements, Tolerance, Value
 from jaxcage.design.requirements import listed
 from jaxcage.forces import parameter
 from jaxcage.orbits import follow, stable_range
@@ -55,6 +55,21 @@ def planted():
     found = stable_range(window(), OPERATING, LIMITS)
     assert found.lower.kind == found.upper.kind == "period-doubling"
     return found
+
+
+def test_an_edge_within_the_narrow_speeds_where_contact_begins_is_located():
+    """Near 27473 rpm the period doubles a few rpm before a pair of multipliers leaves the unit circle; the steps along
+    the branch are hundreds of rpm long there."""
+    model = jc.replace(
+        jc.case("3a"),
+        **{"guidance_gap": 0.6e-3, "eccentricity": 36.006e-6, "temperature": 303.15, "land_width": 2.0132e-3},
+        **{"cage_mass": 0.30251, "rib_diameter": 0.093798, "amplitude": 84.904, "stiffness": 1.7527e9},
+    )
+    rpm = np.pi / 30
+    found = stable_range(model, (12500 * rpm, 18500 * rpm), (6250 * rpm, 37000 * rpm)).upper
+    assert found is not None and found.kind == "period-doubling"
+    orbit_there = jc.periodic_orbit(model, found.speed, guess=found.state)
+    assert np.min(np.abs(np.asarray(orbit_there.multipliers) + 1)) < 1e-4
 
 
 # --- following ------------------------------------------------------------------------------------------------------
@@ -307,6 +322,21 @@ def test_a_search_goes_on_beyond_an_unstable_range():
     found = jc.design_for(begin, (0.8, 1.2), {"x": (0.9, 2.0), "d": (-0.05, 0.05)}, KEEP, reward, check=0)
     assert found.feasible and found.values["d"] == pytest.approx(0.05, abs=1e-4) and found.notes
     assert found.values["x"] >= 1.32 + np.sqrt(found.values["d"]) - 1e-3
+
+
+@pytest.mark.parametrize(("lower", "upper", "known"), [(5.0, 30.0, True), (30.0, 5.0, False)])
+def test_an_edge_that_jumps_concerns_its_own_margin(monkeypatch, lower, upper, known):
+    """A search may go on where one edge jumps beyond its margin, although the other margin is not kept yet."""
+    range_ = OperatingRange(DesignSpace.of(window(), VARY), OPERATING, KEEP.margin)
+    still = np.zeros(len(VARY))
+
+    def margins(place):
+        range_.handed_over.append("upper edge: turned back; now 30 rpm, fold")
+        return {"lower margin": Value(lower, still), "upper margin": Value(upper, still), "peak": Value(0.0, still)}
+
+    monkeypatch.setattr(range_, "margins", margins)
+    found = range_.values(range_.space.place, listed(KEEP, window()))
+    assert isinstance(found, dict) == known and len(range_.handed_over) == known
 
 
 REFUSED = [

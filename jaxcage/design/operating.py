@@ -354,11 +354,12 @@ class OperatingRange(_AroundEdges):
         found = self.margins(place)
         if isinstance(found, str):
             return found
-        if len(self.handed_over) > before and min(r.slack(found[r.of])[0] for r in wanted[:2]) < -KEPT:
+        jumped = self.handed_over[before:]
+        broken = [r.of.split()[0] for r in wanted[:2] if r.slack(found[r.of])[0] < -KEPT]
+        if any(words.split()[0] in broken for words in jumped):
             self._anchors.pop()  # beyond a jump of an edge, where no gradient leads back
-            jumped = "; ".join(self.handed_over[before:])
             del self.handed_over[before:]
-            return jumped
+            return "; ".join(jumped)
         if "balance" in names:
             found["balance"] = balance_grade(self.space, self.operating, place)
         worst = self.worst(place, tuple(name for name in ("multiplier", *READ) if name in names))

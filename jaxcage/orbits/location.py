@@ -6,7 +6,7 @@ planes across the chord between two orbits. All bifurcations are located at the 
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import jax
@@ -25,6 +25,7 @@ BESIDE = 0.02  # half-width of the first bracket with other steps, over the dist
 PART = 1e-3  # it is refined until it moves by this fraction of its last move
 CLEAR = 1e-4  # orbits with a multiplier this close to the unit circle are not counted as stable or unstable
 HALVINGS, APART = 20, 1e-7  # most halvings of a step, and the length below which it is not halved
+SHORTER = 4  # halvings of a step in which nothing located explains a change
 NEARLY = 0.1  # allowed error of a parabola: its extremum over the function's change, its position over a step
 SUNK = 0.75  # an extremum below this fraction of the smaller end value is too low for the parabola to be trusted
 LOOKED = 1e-4  # shorter steps are not halved because of a parabola: where orbits cross, test functions are rounding
@@ -64,8 +65,8 @@ def bifurcations_of(problem: ContinuationProblem, rows: Sequence[Points]) -> lis
     """Return the orbits of branches, and their bifurcations in order; between any two there is an orbit.
 
     If the number of unstable multipliers changes in a way that the detected bifurcations do not explain, as when two
-    real multipliers pass -1 within a step, the step is halved. If the located bifurcations do not explain it, the
-    orbits are solved for again and the bifurcations located once more. If a change is still not explained, two
+    real multipliers pass -1 within a step, the step is halved. If the located bifurcations do not explain it, they
+    are located again from orbits with finer steps, and then from closer orbits. If a change is still not explained, two
     multipliers or pairs may cross together (`DOUBLE`). Otherwise it has the kind `unexplained`: the curve may not be a
     branch there.
     """
@@ -74,10 +75,11 @@ def bifurcations_of(problem: ContinuationProblem, rows: Sequence[Points]) -> lis
     rows = [_halved(problem, row) for row in at_root]
     places = _located(problem, rows)
     gaps = lambda i: _gaps(problem, rows[i], [(p.after, p.kind) for p in places[i]])
-    doubtful = [i for i in range(len(rows)) if gaps(i)]
-    again = [_halved(problem, _with_finer_steps(problem, rows[i], gaps(i))) for i in doubtful]
-    for i, row, mine in zip(doubtful, again, _located(problem, again), strict=True):
-        rows[i], places[i] = row, mine
+    for closer in (_with_finer_steps, *[_with_shorter_steps] * SHORTER):
+        doubtful = [i for i in range(len(rows)) if gaps(i)]
+        again = [_halved(problem, closer(problem, rows[i], gaps(i))) for i in doubtful]
+        for i, row, mine in zip(doubtful, again, _located(problem, again), strict=True):
+            rows[i], places[i] = row, mine
     found = []
     for i in range(len(rows)):
         rows[i], places[i] = row, mine = _parted(problem, rows[i], places[i])
@@ -127,16 +129,19 @@ def _with_middles(
 def _halved(problem: ContinuationProblem, row: Points) -> Points:
     """Halve steps over which the stability changes without a detected bifurcation, or may change twice."""
     for _ in range(HALVINGS):
-        gaps = sorted({*_gaps(problem, row, _likely(problem, row)), *_dips(problem, row)})
-        length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
-        longest = sorted({a + int(np.argmax(length[a:b])) for a, b in gaps})
-        after = np.array([k for k in longest if length[k] > APART], dtype=int)
-        if not after.size:
-            break
-        row, good = _with_middles(problem, row, after, row.take(after), row.take(after + 1))
-        if not np.any(good):
+        gaps = {*_gaps(problem, row, _likely(problem, row)), *_dips(problem, row)}
+        before, row = len(row.u), _with_shorter_steps(problem, row, gaps)
+        if len(row.u) == before:
             break
     return row
+
+
+def _with_shorter_steps(problem: ContinuationProblem, row: Points, gaps: Collection[tuple[int, int]]) -> Points:
+    """Return the orbits with one more in the longest step of each gap, where one is found."""
+    length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
+    longest = sorted({a + int(np.argmax(length[a:b])) for a, b in gaps})
+    after = np.array([k for k in longest if length[k] > APART], dtype=int)
+    return _with_middles(problem, row, after, row.take(after), row.take(after + 1))[0] if after.size else row
 
 
 def _in_order(row: Points, places: Sequence[Place]) -> list[Place]:
