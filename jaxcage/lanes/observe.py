@@ -1,4 +1,4 @@
-"""Integration of lanes with observations: strobe states, growth of tangent vectors, integrals of quantities, errors.
+"""Integration of lanes with observations: strobe states, growth of tangents (Lyapunov exponents), integrals, errors.
 
 The results of a lane depend neither on the other lanes nor on the number of threads. Lanes are the first axis of all
 arrays.

@@ -6,7 +6,7 @@
 | `newton`          | Newton's method for orbits, damped; derivatives by the implicit function theorem    |
 | `orbit`           | periodic orbits, their multipliers, and the determinant these must have             |
 | `point`           | bifurcation points: kinds, and matrices and functions that vanish there             |
-| `arclength`       | step control of continuation: predictions, accepted and rejected steps              |
+| `step_length`     | step control of continuation: predictions, accepted and rejected steps              |
 | `continuation`    | pseudo-arclength continuation, an iterator with step control and events             |
 | `location`        | bifurcations between orbits of a branch, compared with every change of stability    |
 | `branch`          | branches of orbits with their bifurcations                                          |
@@ -18,7 +18,6 @@
 """
 
 from .._arguments import check_layer
-from .arclength import StepControl as StepControl
 from .bifurcation import bifurcation as bifurcation
 from .branch import Branch as Branch, branch as branch
 from .curves import Curve as Curve, Followed as Followed, curve as curve, follow as follow, follow_all as follow_all
@@ -38,6 +37,7 @@ from .search import (
     stable_range as stable_range,
     synchronous_orbits as synchronous_orbits,
 )
+from .step_length import StepControl as StepControl
 from .unstable import (
     Explained as Explained,
     UnstableRanges as UnstableRanges,

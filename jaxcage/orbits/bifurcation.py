@@ -11,7 +11,6 @@ from .._arguments import require_at_least, require_x64
 from .._pytrees import Scalar, compiled
 from ..models import AbstractForcedSystem
 from ..solve import AbstractMethod
-from .arclength import Points, StepControl
 from .branch import follow_both_ways
 from .continuation import Path, orbit_curves
 from .location import sign_changes
@@ -48,6 +47,7 @@ from .problem import (
     other_steps,
     with_fallback,
 )
+from .step_length import Points, StepControl
 
 
 TANGENTIAL = 1e-2  # smallest change of |mu| for a relative change of the parameter by 1 at a crossing

@@ -13,12 +13,12 @@ from .._pytrees import Scalar
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import IMPLICIT, AbstractMethod
-from .arclength import Points, StepControl
 from .continuation import Continuation, ContinuationProblem, Event, Path, Start, orbit_curves
 from .location import Place, bifurcations_of
 from .orbit import NearOrbit, Orbit
 from .point import UNEXPLAINED, Outcome, Point, read_start
 from .problem import SETTLED, SPEED, Given, Parameter, name_of, without_turns
+from .step_length import Points, StepControl
 
 
 @dataclasses.dataclass(frozen=True)

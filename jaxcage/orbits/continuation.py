@@ -1,5 +1,5 @@
 """Pseudo-arclength continuation of many curves of solutions at a time, as an iterator over (problem, points); the step
-control is in `arclength.py`.
+control is in `step_length.py`.
 
 A curve R(u) = 0 with one more unknown than equations is followed through folds, whether stable or not: the step control
 predicts a point, the corrector finds the point of the curve on the plane through it, and events end the curve. Each of
@@ -23,7 +23,6 @@ from jaxtyping import Array, Float
 from .._errors import ArgumentError
 from .._pytrees import compiled
 from ..solve import AbstractMethod, cores
-from .arclength import Points, StepControl
 from .newton import TOLERANCE, AbstractEquations, solve
 from .orbit import OrbitEquations
 from .point import eigenvalues
@@ -40,6 +39,7 @@ from .problem import (
     make_problem,
     without_turns,
 )
+from .step_length import Points, StepControl
 
 
 CHUNK = 8  # points per call: up to eight cost as much as one, since they share vector instructions

@@ -22,12 +22,12 @@ from .._parameters import parameters
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import AbstractMethod
-from .arclength import Points, StepControl
 from .bifurcation import point_equations
 from .continuation import Continuation, ContinuationProblem, Path, first_points, in_parallel
 from .gradient import Sensitivity, sensitivity
 from .point import Point, critical_of, require_found
 from .problem import ENOUGH, SPEED, Given, Parameter, counted, make_problem, value_of
+from .step_length import Points, StepControl
 
 
 SHARE = "share"

@@ -14,10 +14,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from .arclength import Points
 from .continuation import ContinuationProblem, correct, solved_again
 from .point import COMPLEX, DOUBLE, UNEXPLAINED, critical_of, test_functions, to_critical
 from .problem import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
+from .step_length import Points
 
 
 WIDER = (0, 1, 3)  # orbits by which the bracket is widened if the bifurcation is not where it was detected

@@ -21,11 +21,11 @@ from ..lanes import states_at, sweep
 from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import AbstractMethod
-from .arclength import StepControl
 from .branch import Branch, follow_both_ways
 from .continuation import ContinuationProblem, orbit_curves
 from .point import Point
 from .problem import SPEED, Given, turns_of, without_turns
+from .step_length import StepControl
 
 
 ROUND, ROUNDS = 4, 8  # branches followed at a time, and maximum number of rounds
