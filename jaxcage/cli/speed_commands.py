@@ -70,8 +70,11 @@ def simulate(
         notes += jc.show.minimum_load_notes(model.bearing, float(model.load), shaft, slip)
         k, hardness = float(model.wear.wear_coefficient), float(model.wear.hardness) / 1e9
         said = "wear is proportional to K, which is known to a decade or two at best"
+        material = None if subject.file is None else subject.file.material
+        if material is not None and material.name != "brass" and hardness == 0.93:
+            said += f"; this hardness is that of brass, not of {material.name}: give both below [wear]"
         notes.append(f"Wear by Archard's law with K = {k:g} and a hardness of {hardness:g} GPa: {said}")
-    told = [jc.show.quantity_words(measures[name].quantity, measures.value(name)) for name in TOLD if name in measures]
+    told = [jc.show.quantity_words(measures[name]) for name in TOLD if name in measures]
     files = {"figure": jc.show.run_figure(model, found, rollers, title), "data": columns}
     tables = jc.show.run_tables(title, measures, rollers)
     return Answer(f"At {where}: {', '.join(told)}.", tables, notes, document, files, part=f"_{speed:g}rpm")
