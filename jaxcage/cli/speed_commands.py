@@ -67,17 +67,23 @@ def simulate(
         document |= {"around": rollers.around, "orders": rollers.orders, "force_shares": shares}
         columns = jc.show.roller_columns(rollers.history)
         shaft, slip = float(document["shaft_speed_rpm"]), measures.value("cage_slip")
-        notes += jc.show.minimum_load_notes(model.bearing, float(model.load), shaft, slip)
-        k, hardness = float(model.wear.wear_coefficient), float(model.wear.hardness) / 1e9
-        said = "wear is proportional to K, which is known to a decade or two at best"
-        material = None if subject.file is None else subject.file.material
-        if material is not None and material.name != "brass" and hardness == 0.93:
-            said += f"; this hardness is that of brass, not of {material.name}: give both below [wear]"
-        notes.append(f"Wear by Archard's law with K = {k:g} and a hardness of {hardness:g} GPa: {said}")
+        notes += [*jc.show.minimum_load_notes(model.bearing, float(model.load), shaft, slip), *_wear_notes(subject)]
     told = [jc.show.quantity_words(measures[name]) for name in TOLD if name in measures]
     files = {"figure": jc.show.run_figure(model, found, rollers, title), "data": columns}
     tables = jc.show.run_tables(title, measures, rollers)
     return Answer(f"At {where}: {', '.join(told)}.", tables, notes, document, files, part=f"_{speed:g}rpm")
+
+
+def _wear_notes(subject: Subject) -> list[str]:
+    """A note on the law of wear of a bearing with its rollers."""
+    if not subject.with_rollers:
+        return []
+    k, hardness = float(subject.model.wear.wear_coefficient), float(subject.model.wear.hardness) / 1e9
+    said = "wear is proportional to K, which is known to a decade or two at best"
+    material = None if subject.file is None else subject.file.material
+    if material is not None and material.name != "brass" and hardness == 0.93:
+        said += f"; this hardness is that of brass, not of {material.name}: give both below [wear]"
+    return [f"Wear by Archard's law with K = {k:g} and a hardness of {hardness:g} GPa: {said}"]
 
 
 def sweep(
@@ -249,7 +255,9 @@ def compare(
         *(dataclasses.replace(table, key="") for table in tables),
     ]
     files = {"figure": jc.show.quantities_beside(names, found, compared, title=" and ".join(names))}
-    return Answer(" ".join(said), tables, [], {"cases": names, "designs": designs}, files, part=f"_{names[1]}")
+    first, others = ([*each.about(False)[1], *_wear_notes(each)] for each in pair)
+    notes = [*_wear_notes(subject), *(f"{second.name}: {note}" for note in others if note not in first)]
+    return Answer(" ".join(said), tables, notes, {"cases": names, "designs": designs}, files, part=f"_{names[1]}")
 
 
 def _measured(subject: Subject, found: Any) -> Any:

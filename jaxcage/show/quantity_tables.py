@@ -75,13 +75,16 @@ def quantities_table(title: str, found: xr.Dataset, names: Sequence[str]) -> Tab
 
 
 def means_table(designs: Sequence[str], found: Sequence[xr.Dataset], names: Sequence[str]) -> Table:
-    """Table of means over speed of quantities of several designs, side by side."""
+    """Table of means over speed of quantities of several designs, side by side, with their standard errors."""
     rows = []
     for name in names:
-        means = [float(np.nanmean(mean_over_starts(data, name)[0])) for data in found]
         column = column_of(found[0], name)
-        rows.append({"measure": column.head, "unit": column.unit, **dict(zip(designs, means, strict=True))})
-    return table("Means over speed", rows, ["measure", UNIT, *(Column(name, unit=OWN) for name in designs)], "means")
+        rows.append(row := {"measure": column.head, "unit": column.unit})
+        for design, data in zip(designs, found, strict=True):
+            values, errors = mean_over_starts(data, name)
+            row |= {design: np.nanmean(values), f"{design}_error": np.sqrt(np.sum(errors**2)) / errors.size}
+    columns = (Column(name, unit=OWN, error=f"{name}_error") for name in designs)
+    return table("Means over speed", rows, ["measure", UNIT, *columns], "means")
 
 
 def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Table]:
