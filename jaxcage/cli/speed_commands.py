@@ -182,7 +182,8 @@ def said_of(subject: Subject, found: Any, zones: Any) -> str:
     between = f"{between} of the {whose}"
     if "strobe" not in found:
         each = (f"{jc.show.motion_words(z.labels)} {z.low_rpm:.0f} to {z.high_rpm:.0f} rpm" for z in zones)
-        return f"Motion of the cage {between}: {', '.join(each)}."
+        count = f"at {rpm.size} speeds " if rpm.size > 1 else ""
+        return f"Motion of the cage {count}{between}: {', '.join(each)}."
     each = ", ".join(jc.show.zone_words(zone, subject.beside) for zone in zones.zones)
     lasts = f", in which chaos lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
     count = jc.show.counted(len(zones.zones), "chaotic zone") if zones.zones else "No chaotic zone"

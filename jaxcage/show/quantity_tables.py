@@ -79,10 +79,11 @@ def means_table(designs: Sequence[str], found: Sequence[xr.Dataset], names: Sequ
     rows = []
     for name in names:
         column = column_of(found[0], name)
-        rows.append(row := {"measure": column.head, "unit": column.unit})
+        row: dict[str, Any] = {"measure": column.head, "unit": column.unit}
         for design, data in zip(designs, found, strict=True):
             values, errors = mean_over_starts(data, name)
             row |= {design: np.nanmean(values), f"{design}_error": np.sqrt(np.sum(errors**2)) / errors.size}
+        rows.append(row)
     columns = (Column(name, unit=OWN, error=f"{name}_error") for name in designs)
     return table("Means over speed", rows, ["measure", UNIT, *columns], "means")
 
