@@ -269,6 +269,14 @@ def test_runup(capsys: pytest.CaptureFixture[str], tmp_path: Path):
 
 
 @pytest.mark.wide
+def test_a_design_that_breaks_the_design_rule_says_so(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """The gap that a design of 1a asks for, 0.63 mm, is wider than these pockets are clear."""
+    (path := tmp_path / "wide.toml").write_text('base = "1a"\n[bearing]\npocket_clearance = "0.5 mm"')
+    assert main(["design", str(path), "--operating", "31500-44000 rpm shaft", "--out", str(tmp_path)]) == 0
+    assert "breaks the design rule T > C_r > G_r: Pocket clearance T = 0.5 mm" in capsys.readouterr().out
+
+
+@pytest.mark.wide
 def test_design_and_sensitivity(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     """A search too short to find much; balance in closed form."""
     few = ["--first", "8000rpm", "--last", "14000rpm", "--count", "6", "--out", str(tmp_path)]

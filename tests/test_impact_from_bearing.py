@@ -173,6 +173,17 @@ def test_what_a_file_gives_wins_over_its_material():
     assert float(model_from({"base": "1a", "material": "PA66"}).cage_mass) == pytest.approx(0.04, rel=0.1)
 
 
+def test_a_cage_on_the_inner_ring_is_a_smaller_ring():
+    """Its bore is that of the land and the gap, so that it is lighter than one of the same height below the ribs."""
+    given = {"base": "nu2310", "material": "brass"}
+    inner = model_from(given | {"guidance": "inner", "inner_land_diameter": "69 mm"})
+    bore, height = (69e-3 + 0.45e-3) / 2, 0.52 * 16e-3
+    assert float(inner.cage_inertia / inner.cage_mass) == pytest.approx((bore**2 + (bore + height) ** 2) / 2)
+    mean = lambda outside: 2 * np.pi * height * (27e-3 + 0.65 * 13e-3) * (outside - height / 2)
+    lost = 8430 * (mean((92.1e-3 - 0.45e-3) / 2) - mean(bore + height))
+    assert float(model_from(given).cage_mass - inner.cage_mass) == pytest.approx(lost)
+
+
 @pytest.mark.parametrize("given", ['"PEK"', "3", '""'])
 def test_a_material_that_nobody_knows_is_refused_at_once(given: str):
     began = time.perf_counter()

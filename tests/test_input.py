@@ -49,7 +49,7 @@ WRONG = {
     'eccentricity = "G6.3 at 200 Hz shaft"': 'such as "G6.3 at 12000 rpm shaft", but is in Hz',
     'guidance = "inner"': 'Key `guidance` at the top level needs model = "bearing".',
     'bearing.designation = "6204"': "`bearing.designation` must be one of NU1010, NU1014,",
-    'bearing.pocket_clearance = "4 mm"': "which are 19.57 mm apart, but makes them 20 mm wide.",
+    'bearing.pocket_clearance = "3.45 mm"': "which are 19.38 mm apart, but makes them 19.45 mm wide.",
     'eccentricity = "0.5 mm"': "`eccentricity` must be smaller than `guidance_gap`, but is 0.5 mm in a gap of 0.45 mm.",
     'eccentricity = "G6300 at 1200 rpm cage"': 'but is 0.0501338 m (given as "G6300 at 1200 rpm cage").',
     'bearing.bore = "70 mm"': "`bearing.bore` must be below the inner raceway, 65 mm, but is 70 mm.",
@@ -143,6 +143,8 @@ def test_eccentricity_by_a_balance_grade():
     assert float(read("G6.3 at 12000 rpm", speeds="shaft").eccentricity) == pytest.approx(of_cage * 180 / 80)
     whole = model_from({"base": "nu2310", "eccentricity": "G6.3 at 12000 rpm"})
     assert float(whole.eccentricity) == pytest.approx(of_cage * 162 / 65)
+    planet = model_from({"base": "nu2310", "eccentricity": "G6.3 at 12000 rpm", "outer_speed": "-3000 rpm"})
+    assert float(planet.eccentricity) == pytest.approx(of_cage * 162 / (65 - 97 / 4))
     with pytest.raises(ConfigError, match=r"`eccentricity` must be a number .* but is 0.0501"):
         read("G6300 at 1200 rpm cage")
 
@@ -170,7 +172,7 @@ def test_clearances_that_dimensions_leave_out_are_estimated(tmp_path: Path):
     text = re.sub(r"(?m)^(radial|pocket)_clearance = .*$", "", text)
     path.write_text(text)
     file = read_bearing(path)
-    assert file.estimated == ("bearing.radial_clearance", "bearing.pocket_clearance")
+    assert file.estimated == ("bearing.radial_clearance", "bearing.pocket_clearance", "load")
     bearing = listed("NU2210").bearing  # of the same bore; 0.3 mm is the pocket clearance of the paper's rollers
     assert float(file.model.bearing.radial_clearance) == float(bearing.radial_clearance)
     assert float(file.model.bearing.pocket_clearance) == pytest.approx(0.3e-3)

@@ -276,3 +276,12 @@ def test_map_of_a_system_agrees_with_a_sweep():
         same, near = same + np.sum(agree), near + mine.size
     assert same >= 0.9 * near  # long chaotic lanes differ by rounding, and a few of their labels with them
     assert found["label"].dims == ("speed", "force", "initial_state") and np.any(found["label"] == "chaotic")
+
+
+def test_the_exponent_of_a_stretch_has_the_error_of_its_speeds():
+    """How it grows from one speed to the next is no error of its mean."""
+    growth = np.array([[50.0, 52.0], [30.0, 32.0]])
+    data = {"label": (("speed", "initial_state"), np.full((2, 1), "disordered"))}
+    data |= {"block_growth": (("speed", "initial_state", "growth_block", "exponent"), growth[:, None, :, None])}
+    (found,) = jc.stretches(xr.Dataset(data, coords={"rpm": ("speed", [1000.0, 2000.0])}))
+    assert (found.exponent, found.exponent_error) == pytest.approx((41.0, np.sqrt(2) / 2))

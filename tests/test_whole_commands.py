@@ -38,6 +38,8 @@ def test_simulate(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path, mi
     expected = jc.measures(model, jc.simulate(model, SPEED, revolutions=1, samples=128))
     for name in ("cage_slip", "pocket_force_mean_sum_N", "eccentricity_mean"):
         assert measures[name] == pytest.approx(expected[name].value, rel=1e-9)
+    of = expected["whirl_ratio"]._replace(value=0.0002518, error=0.0047)
+    assert jc.show.quantity_words(of) == "whirl ratio 0.0003 ± 0.0047"
 
 
 @pytest.mark.wide
@@ -146,3 +148,8 @@ def test_speeds_of_the_cage_with_a_turning_outer_ring(capsys: pytest.CaptureFixt
     for text in ("1200 rpm cage", f"{(1200 - at_rest) / ratio:.6f} rpm shaft"):
         found = jc.files.own_rpm(planet, jc.files.read_rpm(text))
         assert found == pytest.approx((1200 - at_rest) / ratio, abs=1e-3)
+    found = document(capsys, "statics", str(path), "--speed", "4000 rpm shaft", "--out", str(tmp_path))
+    cage = at_rest + 4000 * ratio
+    assert found["kinematics"] == pytest.approx({"cage_speed_ratio": cage / 4000, "cage_speed": cage * np.pi / 30})
+    centrifugal = np.array(found["outer_loads"]) - np.array(found["inner_loads"])
+    np.testing.assert_allclose(centrifugal, float(planet.bearing.roller_mass) * (cage * np.pi / 30) ** 2 * 40.5e-3)

@@ -299,9 +299,11 @@ def _kind(sweep: xr.Dataset, label: np.ndarray, i: int) -> tuple[tuple[str, ...]
 
 
 def _exponent(sweep: xr.Dataset, speeds: slice) -> tuple[float, float]:
-    """Mean of the largest exponent over all blocks of some speeds, and its standard error; NaN with fewer than two."""
-    blocks = sweep["block_growth"].values[speeds][..., :1]
-    known = blocks[np.isfinite(blocks)]
-    if known.size < 2:
+    """Mean over some speeds of the largest exponent, that of all blocks at a speed, and its standard error from the
+    scatter at each speed; NaN with fewer than two blocks."""
+    blocks = (each[np.isfinite(each)] for each in sweep["block_growth"].values[speeds][..., :1])
+    known = [each for each in blocks if each.size > 1]
+    if not known:
         return float("nan"), float("nan")
-    return float(known.mean()), float(known.std(ddof=1) / np.sqrt(known.size))
+    error = np.linalg.norm([each.std(ddof=1) / np.sqrt(each.size) for each in known]) / len(known)
+    return float(np.mean([each.mean() for each in known])), float(error)

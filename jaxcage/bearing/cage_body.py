@@ -1,6 +1,6 @@
 """Shape of the cage of a bearing, estimated from the bearing's dimensions, and the stiffness of its bars.
 
-The cage is a ring below the ribs of the outer ring, with a rectangular pocket for each roller. Three proportions are
+The cage is a ring on the land that guides it, with a rectangular pocket for each roller. Three proportions are
 those of the NU2310 (a ring from 75 to 91.65 mm): the estimate is within 5 % of the 0.25 kg of its brass cage. Cages of
 other bearings and makers differ by a third or so: a weighed mass is better.
 """
@@ -35,11 +35,12 @@ class CageBody(NamedTuple):
     gyration: Array
 
 
-def cage_body(bearing: Bearing, guidance_gap: Scalar) -> CageBody:
-    """Estimate the shape of a cage with a guidance gap [m]."""
+def cage_body(bearing: Bearing, guidance_gap: Scalar, inner_land: Scalar | None = None) -> CageBody:
+    """Estimate the shape of a cage with a guidance gap [m], below the ribs of the outer ring or, if its diameter [m] is
+    given, on a land of the inner ring."""
     b = bearing
     pocket, height = b.roller_diameter + b.pocket_clearance, jnp.asarray(HEIGHT * b.roller_diameter)
-    outer = (b.rib_diameter - guidance_gap) / 2
+    outer = (b.rib_diameter - guidance_gap) / 2 if inner_land is None else (inner_land + guidance_gap) / 2 + height
     inner = outer - height
     width = b.roller_length + 2 * FLANGE * b.land_width_limit
     volume = jnp.pi * (outer**2 - inner**2) * width - b.n_rollers * pocket * b.roller_length * height

@@ -140,7 +140,7 @@ def design_rule_violations(bearing: Bearing, guidance_gap: Scalar) -> list[str]:
     if not t > c_r:
         sentences.append(
             f"Pocket clearance T = {t:g} mm should exceed the guidance gap C_r = {c_r:g} mm, "
-            "so that the rib and not the rollers guides the cage."
+            "so that the land and not the rollers guides the cage."
         )
     if not c_r > g_r:
         sentences.append(

@@ -135,8 +135,10 @@ def statics(
     model, bearing, force = subject.model, subject.model.bearing, float(subject.model.load) if load is None else load
     if force <= 0:
         raise InputError(f"The load of {subject.name} must be above 0 N, but it is {force:g}: give one with --load.")
-    shaft = 0.0 if speed is None else float(subject.both(subject.speed(speed))["shaft_speed_rpm"]) / RPM
-    found = jc.bearing.load_distribution(bearing, force, bearing.roller_centrifugal_force(shaft))
+    speeds = {} if speed is None else subject.both(subject.speed(speed))
+    shaft, cage = (float(speeds.get(f"{whose}_speed_rpm", 0.0)) / RPM for whose in ("shaft", "cage"))
+    centrifugal = bearing.roller_centrifugal_force(bearing.shaft_speed(cage))
+    found = jc.bearing.load_distribution(bearing, force, centrifugal)
     title = f"{subject.name} at {force:g} N, {f'shaft at {shaft * RPM:.0f} rpm' if shaft else 'at rest'}"
     loads = np.asarray(found.inner_loads)
     said = f"{np.sum(loads > 0)} of {loads.size} rollers carry {force:g} N, the most loaded one {np.max(loads):.0f} N."
@@ -147,11 +149,13 @@ def statics(
         "cage_displacement": jc.show.displacements(model, found),
     }
     document["kinematic_viscosity"] = model.lubricant.kinematic_viscosity
-    document["kinematics"] = {"cage_speed_ratio": bearing.cage_speed_ratio, "cage_speed": bearing.cage_speed(shaft)}
+    ratio = cage / shaft if shaft else bearing.cage_speed_ratio
+    document["kinematics"] = {"cage_speed_ratio": ratio, "cage_speed": cage}
     arrays = {"angle [rad]": found.roller_angles, "inner load [N]": loads, "outer load [N]": found.outer_loads}
     columns = {head: np.asarray(x) for head, x in arrays.items()}
     files = {"figure": jc.show.drawn(partial(jc.show.load_bars, found), 7.0, 3.8, title), "data": columns}
-    table = jc.show.statics_table(f"Statics of {title}", model, found, shaft or None)
+    turning = (shaft, cage, centrifugal) if shaft else None
+    table = jc.show.statics_table(f"Statics of {title}", model, found, ratio, turning)
     return Answer(said, [table], jc.show.minimum_load_notes(bearing, force, shaft * RPM), document, files)
 
 

@@ -98,6 +98,7 @@ def design(
     said = said if found.changed else "No better design was found: the given one stays."
     notes += [f"Search: {len(found.history)} steps, objective {found.objective:.4g}"]
     notes += [f"At a bound: {', '.join(found.at_bound) or 'no parameter'}", f"Fresh runs that failed: {failed}"]
+    notes += _broken_rule(model, found.model)
     document = {"vary": bounds, "prices": prices, "better": better, "optimum": found.values, "failed": failed}
     document |= {"objective": found.objective, "at_bound": found.at_bound}
     tables = [
@@ -141,12 +142,18 @@ def _calm_design(
     notes += [f"10 % stricter {name}: costs {price:.2g} more" for name, price in jc.show.stricter(best).items()]
     notes += [f"On the way: {note}" for note in best.notes] + [jc.show.BY_CAGE_MODEL]
     notes += [] if best.checked is None else [f"Checked: {best.checked} ({best.checked.method})"]
-    notes.append(f"Designs solved for: {best.evaluations}")
+    notes += [f"Designs solved for: {best.evaluations}", *_broken_rule(model, best.model)]
     names = ("verdict", "checked", "cost", "cost_before", "prices", "conflict", "at_bound")
     document = {"optimum": best.values, "vary": bounds} | {name: getattr(best, name) for name in names}
     document["operating_rpm"] = ends = low * RPM, high * RPM
     said = _calm_sentence(best, subject.over(low, high), calm.objective)
     return Answer(said, tables, notes, document, {"figure": jc.show.calm_figure(best, ends, name)})
+
+
+def _broken_rule(given: Any, found: Any) -> list[str]:
+    """Notes if a design breaks the design rule where the given one does not."""
+    before, after = (jc.bearing.design_rule_violations(each.bearing, each.guidance_gap) for each in (given, found))
+    return [] if before else [f"This design breaks the design rule T > C_r > G_r: {words}" for words in after]
 
 
 def _calm_sentence(best: Any, over: str, objective: str) -> str:

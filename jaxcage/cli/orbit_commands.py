@@ -69,7 +69,7 @@ def _searched(subject: Subject, over: o.Range, discard: int | None, method: Any,
         what = f"No simulation {between} settled on a synchronous orbit"
         raise NoResult(f"{what}: try more --discard, or a larger --count.")
     if purpose and not loss.edges:
-        what = f"No zone without a stable synchronous orbit begins or ends {between}"
+        what = f"No unstable range of the synchronous orbit begins or ends {between}"
         raise NoResult(f"{what}: there is no edge to {purpose}.")
     return found, loss
 

@@ -67,14 +67,20 @@ def simulate(
         document |= {"around": rollers.around, "orders": rollers.orders, "force_shares": shares}
         columns = jc.show.roller_columns(rollers.history)
         shaft, slip = float(document["shaft_speed_rpm"]), measures.value("cage_slip")
-        notes += jc.show.minimum_load_notes(model.bearing, float(model.load), shaft, slip)
-        k, hardness = float(model.wear.wear_coefficient), float(model.wear.hardness) / 1e9
-        said = "wear is proportional to K, which is known to a decade or two at best"
-        notes.append(f"Wear by Archard's law with K = {k:g} and a hardness of {hardness:g} GPa: {said}")
-    told = [jc.show.quantity_words(measures[name].quantity, measures.value(name)) for name in TOLD if name in measures]
+        notes += [*jc.show.minimum_load_notes(model.bearing, float(model.load), shaft, slip), *_wear_notes(subject)]
+    told = [jc.show.quantity_words(measures[name]) for name in TOLD if name in measures]
     files = {"figure": jc.show.run_figure(model, found, rollers, title), "data": columns}
     tables = jc.show.run_tables(title, measures, rollers)
     return Answer(f"At {where}: {', '.join(told)}.", tables, notes, document, files, part=f"_{speed:g}rpm")
+
+
+def _wear_notes(subject: Subject) -> list[str]:
+    """A note on the law of wear of a bearing with its rollers."""
+    if not subject.with_rollers:
+        return []
+    k, hardness = float(subject.model.wear.wear_coefficient), float(subject.model.wear.hardness) / 1e9
+    said = "wear is proportional to K, which is known to a decade or two at best"
+    return [f"Wear by Archard's law with K = {k:g} and a hardness of {hardness:g} GPa: {said}"]
 
 
 def sweep(
@@ -173,7 +179,8 @@ def said_of(subject: Subject, found: Any, zones: Any) -> str:
     between = f"{between} of the {whose}"
     if "strobe" not in found:
         each = (f"{jc.show.motion_words(z.labels)} {z.low_rpm:.0f} to {z.high_rpm:.0f} rpm" for z in zones)
-        return f"Motion of the cage {between}: {', '.join(each)}."
+        count = f"at {rpm.size} speeds " if rpm.size > 1 else ""
+        return f"Motion of the cage {count}{between}: {', '.join(each)}."
     each = ", ".join(jc.show.zone_words(zone, subject.beside) for zone in zones.zones)
     lasts = f", in which chaos lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
     count = jc.show.counted(len(zones.zones), "chaotic zone") if zones.zones else "No chaotic zone"
@@ -246,7 +253,9 @@ def compare(
         *(dataclasses.replace(table, key="") for table in tables),
     ]
     files = {"figure": jc.show.quantities_beside(names, found, compared, title=" and ".join(names))}
-    return Answer(" ".join(said), tables, [], {"cases": names, "designs": designs}, files, part=f"_{names[1]}")
+    first, others = ([*each.about(False)[1], *_wear_notes(each)] for each in pair)
+    notes = [*_wear_notes(subject), *(f"{second.name}: {note}" for note in others if note not in first)]
+    return Answer(" ".join(said), tables, notes, {"cases": names, "designs": designs}, files, part=f"_{names[1]}")
 
 
 def _measured(subject: Subject, found: Any) -> Any:

@@ -94,8 +94,8 @@ class Subject:
 
     def at(self, speed: float) -> str:
         """A speed of the model [rad/s] in words."""
-        other = "shaft" if self.own == "cage" else "cage"
-        return f"{speed * RPM:g} rpm of the {self.own} ({other} {float(self._other(speed * RPM)):.0f} rpm)"
+        other, rolling = ("shaft", "") if self.own == "cage" else ("cage", " in pure rolling")
+        return f"{speed * RPM:g} rpm of the {self.own} ({other} {float(self._other(speed * RPM)):.0f} rpm{rolling})"
 
     def rate(self, given: float) -> float:
         """Rate of the model's speed [rad/s^2] from one [rpm/s] of the speed that bare numbers are."""

@@ -114,8 +114,9 @@ def _filled(root: Part, material: CageMaterial, start: Any) -> Part:
     """A cage or bearing with the values that follow from the material of its cage, where it does not give them."""
     given, parts, values = root.parts.get("bearing"), dict(root.parts), root.values
     bearing: Any = start.bearing if given is None else _build(given, getattr(start, "bearing", None), ("bearing",))
-    gap = values["guidance_gap"] if "guidance_gap" in values else start.guidance_gap
-    body, modulus = cage_body(bearing, gap), material.youngs_modulus
+    known: Any = lambda name: values.get(name, getattr(start, name, None))
+    gap, land = known("guidance_gap"), known("inner_land_diameter") if known("guidance") == "inner" else None
+    body, modulus = cage_body(bearing, gap, land), material.youngs_modulus
     own: dict[str, Any] = {"cage_mass": material.density * body.volume, **values}
     below: dict[str, dict[str, Any]] = {}
     if "pockets" in parts:

@@ -102,7 +102,7 @@ class Description:
     ranges: Ranges
     table: Mapping[str, Any]
     estimated: tuple[str, ...]
-    """Dotted names of values that the file does not give, estimated from dimensions or from the cage material."""
+    """Dotted names of values that the file does not give: from dimensions, from the cage material, or usual ones."""
     material: CageMaterial | None = None
     """Material of the cage, if it is named."""
     left: tuple[str, ...] = ()
@@ -172,14 +172,18 @@ def describe(table: Mapping[str, Any]) -> Description:
         guessed = tuple(f"bearing.{name}" for name in names if name not in rest["bearing"])
         if bearing.ready_made and (drag := root.parts.get("drag")):
             drag.values.setdefault("rolling_coefficient", rolling_coefficient(bearing.ready_made[1]))
+    told = {*rest, *(f"lubricant.{name}" for name in rest.get("lubricant", ()))}
+    guessed += tuple(name for name in ("load", "lubricant.temperature") if base is None and name not in told)
     own = {**rest, **rest.get("pockets", {}), **rest.get("wear", {})}
     guessed += tuple(where for name, where in made.items() if name not in own)
     found = Description(subject, base, speeds, root, ranges, table, guessed, material)
     if isinstance(given := root.values.get("eccentricity"), Balance):
         cage, n = given.speed, found.numbers
         if given.whose == "shaft":
-            cage *= cage_speed_ratio(n["inner_raceway_diameter"], n["roller_diameter"])
-        root.values["eccentricity"] = value = 1e-3 * given.grade / cage  # ISO 21940-11
+            ratio = cage_speed_ratio(n["inner_raceway_diameter"], n["roller_diameter"])
+            cage = abs(ratio * cage + (1 - ratio) * n.get("outer_speed", 0.0))
+        value = 1e-3 * given.grade / cage if cage else math.inf  # ISO 21940-11
+        root.values["eccentricity"] = value
         declared = declarations()["modules"][module]["values"]["eccentricity"]
         require_within("eccentricity", value, ParameterInfo(**declared, text=""), given.text)
     check_numbers(found.numbers)

@@ -60,7 +60,7 @@ def _checks(n: Mapping[str, Any]) -> Iterator[tuple[bool, str, str]]:
     carries = mm("effective_length")
     must = f"be at most `roller_length`, {length:g} mm, but is {carries:g} mm"
     yield carries > length * (1 + ROUNDING), "bearing.effective_length", must
-    pocket, room = roller + mm("pocket_clearance"), math.pi * pitch / number("n_rollers")
+    pocket, room = roller + mm("pocket_clearance"), pitch * math.sin(math.pi / number("n_rollers"))
     must = f"leave a bar between pockets, which are {room:.4g} mm apart, but makes them {pocket:g} mm wide"
     yield pocket >= room, "bearing.pocket_clearance", must
     yield gap >= rib, "guidance_gap", f"leave room for the cage, but is {gap:g} mm in a rib of {rib:g} mm"

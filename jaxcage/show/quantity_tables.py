@@ -8,11 +8,11 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Float
 
-from ..analysis import Measures, failed, named_lines, scatter
+from .._pytrees import Scalar
+from ..analysis import Measured, Measures, failed, named_lines, scatter
 from ..bearing import LoadDistribution, static_cage_displacements
-from ..quantities import Quantity
 from .run_figures import SPECTRA, Rollers
-from .tables import OWN, UNIT, Column, Table, table
+from .tables import OWN, UNIT, Column, Table, number, table
 
 
 LONGEST = 60
@@ -45,11 +45,11 @@ def head_of(name: str, unit: str) -> str:
     return name.removesuffix("_" + unit.replace(" ", "_").replace("^", "").replace("/", "_per_")).replace("_", " ")
 
 
-def quantity_words(quantity: Quantity, value: float) -> str:
-    """A quantity in a sentence, such as `friction power 1187 W` or `cage slip 2.1 %`."""
-    if quantity.name in SHARES:
-        return f"{head_of(quantity.name, '1')} {100 * value:.2g} %"
-    return f"{head_of(quantity.name, quantity.unit)} {value:.4g} {quantity.unit}".removesuffix(" 1")
+def quantity_words(found: Measured) -> str:
+    """A quantity in a sentence, with its error: `friction power 1187.0 ± 1.2 W` or `cage slip 2.11 ± 0.12 %`."""
+    quantity, value, error = found
+    times, unit = (100, "%") if quantity.name in SHARES else (1, quantity.unit)
+    return f"{head_of(quantity.name, quantity.unit)} {number(times * value, times * error)} {unit}".removesuffix(" 1")
 
 
 HEADS = {"size": "orbit size", "eccentricity": "largest eccentricity ratio"}
@@ -75,13 +75,17 @@ def quantities_table(title: str, found: xr.Dataset, names: Sequence[str]) -> Tab
 
 
 def means_table(designs: Sequence[str], found: Sequence[xr.Dataset], names: Sequence[str]) -> Table:
-    """Table of means over speed of quantities of several designs, side by side."""
+    """Table of means over speed of quantities of several designs, side by side, with their standard errors."""
     rows = []
     for name in names:
-        means = [float(np.nanmean(mean_over_starts(data, name)[0])) for data in found]
         column = column_of(found[0], name)
-        rows.append({"measure": column.head, "unit": column.unit, **dict(zip(designs, means, strict=True))})
-    return table("Means over speed", rows, ["measure", UNIT, *(Column(name, unit=OWN) for name in designs)], "means")
+        row: dict[str, Any] = {"measure": column.head, "unit": column.unit}
+        for design, data in zip(designs, found, strict=True):
+            values, errors = mean_over_starts(data, name)
+            row |= {design: np.nanmean(values), f"{design}_error": np.sqrt(np.sum(errors**2)) / errors.size}
+        rows.append(row)
+    columns = (Column(name, unit=OWN, error=f"{name}_error") for name in designs)
+    return table("Means over speed", rows, ["measure", UNIT, *columns], "means")
 
 
 def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Table]:
@@ -113,9 +117,11 @@ def displacements(model: Any, shared: LoadDistribution) -> dict[str, float]:
     return {guidance: float(y) for guidance, y in found.items()}
 
 
-def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed: float | None = None) -> Table:
-    """Table of loads and displacements at rest, and the kinematics at a shaft speed [rad/s] if one is given."""
-    bearing = model.bearing
+def statics_table(
+    title: str, model: Any, shared: LoadDistribution, ratio: Scalar, turning: tuple[Scalar, ...] | None = None
+) -> Table:
+    """Table of loads and displacements at rest, the ratio of cage and shaft speed, and both speeds [rad/s] and the
+    centrifugal force of a roller [N] if the bearing is turning."""
     rows: list[tuple[str, Any, str]] = [
         ("largest roller load on the inner raceway", shared.max_load, "N"),
         ("shift of the shaft", shared.shaft_shift, "m"),
@@ -127,11 +133,12 @@ def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed:
     celsius = float(model.lubricant.temperature) - 273.15
     viscosity = 1e6 * model.lubricant.kinematic_viscosity
     rows.append((f"kinematic viscosity of the oil at {celsius:g} °C", viscosity, "mm^2/s"))
-    rows.append(("cage speed over shaft speed", bearing.cage_speed_ratio, "1"))
-    if shaft_speed is not None:
+    rows.append(("cage speed over shaft speed", ratio, "1"))
+    if turning is not None:
+        shaft, cage, centrifugal = turning
         rows += [
-            ("cage speed", bearing.cage_speed(shaft_speed), "rad/s"),
-            ("surface speed of the inner raceway", shaft_speed * bearing.inner_raceway_diameter / 2, "m/s"),
-            ("centrifugal force of a roller", bearing.roller_centrifugal_force(shaft_speed), "N"),
+            ("cage speed", cage, "rad/s"),
+            ("surface speed of the inner raceway", shaft * model.bearing.inner_raceway_diameter / 2, "m/s"),
+            ("centrifugal force of a roller", centrifugal, "N"),
         ]
     return _values_table(title, ((words, float(value), unit, None) for words, value, unit in rows))

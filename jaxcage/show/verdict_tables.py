@@ -215,16 +215,17 @@ def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float, slip: float 
     rules = [(words, value) for words, value in rules if math.isfinite(value)]
     below = [words for words, value in rules if load < value]
     said = "; ".join(f"{value / 1e3:.2g} kN ({words})" for words, value in rules)
-    side = "above all of them" if not below else "below all of them" if len(below) == len(rules) else ""
+    them = "all of them" if len(rules) > 1 else "that"
+    side = f"above {them}" if not below else f"below {them}" if len(below) == len(rules) else ""
     verdict = f"the load of {load / 1e3:.3g} kN is {side or 'below ' + ' and '.join(below)}"
     notes = [f"Minimum load against skidding at {shaft_rpm:.0f} rpm of the shaft: {said}; {verdict}"]
     if slip is None:
         return notes
     given, skids = f"the computed slip of the cage is {slip:.2%}", slip >= SKIDS
     if skids and not below:
-        notes.append(f"The model disagrees with the makers' rules: {given}, although the load is above all of them")
+        notes.append(f"The model disagrees with the makers' rules: {given}, although the load is above {them}")
     if not skids and len(below) == len(rules):
         why = "they hold without preload" if bearing.radial_clearance < 0 else "more oil would make it slip more"
-        said = f"although the load is below all of them; {why}"
+        said = f"although the load is below {them}; {why}"
         notes.append(f"The model disagrees with the makers' rules: {given}, {said}")
     return notes
