@@ -157,3 +157,4 @@ def test_at_a_crawl_it_is_the_orbit_at_that_speed():
     run = jc.simulate(model, jc.rpm(15000), revolutions=200, samples=32, discard=200, method=method)
     size = float(np.max(np.ptp(run.state[:, :2], axis=0)))
     assert found["size"].values == pytest.approx(size, rel=0.05)
+    assert found["eccentricity"].values == pytest.approx(run.peak, rel=1e-3)  # also between samples
