@@ -93,13 +93,13 @@ class Asked:
 
     def tried(self, place: np.ndarray) -> Any:
         """One trial, which is counted."""
-        if len(self.problem.solved) >= BUDGET:
+        if self.problem.evaluations >= BUDGET:
             raise Ended
         trial = self.compute(place)
         self.lost += bool(trial.lost)
         feasible = not trial.lost and np.min(trial.slack) >= -KEPT
         if feasible and trial.cost < min((t[2] for t in self.trace), default=np.inf):
-            self.trace.append((len(self.problem.solved), round(time.process_time() - self.began, 1), trial.cost))
+            self.trace.append((self.problem.evaluations, round(time.process_time() - self.began, 1), trial.cost))
             if trial.cost <= self.until:
                 raise Ended
         return trial
@@ -156,7 +156,7 @@ def searched(case: Case, name: str, kind: str, seed: int, least: float) -> dict[
         KINDS[kind](asked, seed)
     except Ended:
         pass
-    tried = {"evaluations": len(asked.problem.solved), "lost": asked.lost, "trace": asked.trace}
+    tried = {"evaluations": asked.problem.evaluations, "lost": asked.lost, "trace": asked.trace}
     seconds = round(time.process_time() - asked.began, 1)
     return {"case": name, "search": kind, "seed": seed, "cost0": case.cost, "seconds": seconds, **tried}
 

@@ -339,6 +339,30 @@ def test_an_edge_that_jumps_concerns_its_own_margin(monkeypatch, lower, upper, k
     assert isinstance(found, dict) == known and len(range_.handed_over) == known
 
 
+def test_an_edge_that_comes_in_where_the_range_was_open():
+    """The upper edge x + y comes in from 4.2, beyond the limit of the search at 4, to 3: 50 % above the range."""
+    found = jc.design_for(window(y=3.2), OPERATING, {"y": (2.0, 3.3)}, KEEP, cost, check=0)
+    assert found.feasible and found.at_bound == ("y",)
+    assert found.after["upper margin"].value == pytest.approx(50, abs=1e-3)
+
+
+class Bent(eqx.Module):
+    """The orbit e^3 - p e = w - 1.6, beside a forced f: it folds where p > 0, at w = 1.6 -+ 2 (p/3)^(3/2)."""
+
+    p: jax.Array = parameter("1", -1.0, 1.0, "bend")
+
+    def __call__(self, tau, y, speed):
+        return speed - 1.6 - y[0] ** 3 + self.p * y[0], jnp.sin(tau) - y[1]
+
+
+def test_a_fold_that_comes_into_an_open_range():
+    """The stable orbit of the upper end folds there; another one, at the lower end, is no part of it."""
+    space = DesignSpace.of(jc.ForcedSystem(Bent(p=-0.5), dimension=2), {"p": (-1.0, 1.0)})
+    found = OperatingRange(space, (1.2, 2.4)).margins(np.array([0.8]))
+    assert found["lower margin"].value == pytest.approx(100 * (1 - (1.6 - 2 * 0.2**1.5) / 1.2))
+    assert found["upper margin"].value == pytest.approx(100)
+
+
 REFUSED = [
     (dict(operating=(2.0, 1.2)), "`operating` must be two positive speeds, ascending, but are 2 and 1.2"),
     (dict(vary={"z": (0.0, 1.0)}), "`z` must be a parameter of the design: x, y, d, k, s, r"),

@@ -52,9 +52,9 @@ def test_simulate(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     found = document(capsys, *asked, *RK4, "--out", str(tmp_path))
     assert found["outcome"] == "successful" and found["measures"]["drag_power"] > 0 and is_png(found["figure"])
     columns, mass = read_columns(found["data"]), float(jc.case("1a").cage_mass)
-    assert columns["time [s]"].size == 3 * 128
-    assert columns["time [s]"][128] == pytest.approx(60 / 15000, rel=1e-9)
-    assert columns["weight_y [N]"] == pytest.approx(np.full(384, -mass * 9.81), rel=1e-9)
+    assert columns["time [s]"].size == 3 * 256
+    assert columns["time [s]"][256] == pytest.approx(60 / 15000, rel=1e-9)
+    assert columns["weight_y [N]"] == pytest.approx(np.full(768, -mass * 9.81), rel=1e-9)
     amplitude = 2 * mass * 0.023 / 0.45 * 1e-3 * (15000 * np.pi / 30) ** 2  # (20) as printed, in mm
     assert columns["unbalance_x [N]"].max() == pytest.approx(amplitude, rel=1e-9)
 

@@ -48,6 +48,13 @@ def test_circular_orbit(ratio, centre):
     assert m.value("velocity_scatter") < 1e-12
 
 
+@pytest.mark.parametrize("ratio", [1.0, -2.0])
+def test_the_whirl_of_a_flat_ellipse_is_whole_after_whole_revolutions(ratio):
+    """Its angular velocity varies fourfold, so that the step after the last sample, which is not recorded, counts."""
+    m = measures(preliminary("1a"), orbit(ratio=ratio, flatten=0.5, revolutions=2))
+    assert m.value("whirl_ratio") == m.value("rib_whirl_ratio") == pytest.approx(ratio, abs=1e-4)
+
+
 def test_ellipse_and_its_velocity_scatter():
     """rms^2 = (a^2 + b^2)/2; |v| = a w sqrt(sin^2 + k^2 cos^2) with k = b/a."""
     m = measures(preliminary("1a"), orbit(flatten=0.5, samples=256))

@@ -157,3 +157,11 @@ def test_at_a_crawl_it_is_the_orbit_at_that_speed():
     run = jc.simulate(model, jc.rpm(15000), revolutions=200, samples=32, discard=200, method=method)
     size = float(np.max(np.ptp(run.state[:, :2], axis=0)))
     assert found["size"].values == pytest.approx(size, rel=0.05)
+
+
+def test_the_largest_eccentricity_of_a_run_up_is_that_between_samples_too():
+    model, ends = jc.case("1a"), jc.rpm(15000, 15100)
+    found = ramp_up_down(model, *ends, jc.rpm(3135), windows=2, settle=0)
+    run = jc.ramp(model, *ends, revolutions=found.attrs["revolutions"], samples=32)
+    sampled = np.max(np.hypot(*run.state[:, :2].T)) / float(model.clearance)
+    assert found["eccentricity"].values[0].max() == pytest.approx(run.peak, rel=1e-9) and run.peak > 1.0001 * sampled

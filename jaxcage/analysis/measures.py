@@ -54,7 +54,7 @@ def cage_history(model: CageModel, trajectory: Trajectory) -> CageHistory:
     names = dict.fromkeys([*own, *FORCES, *extra])  # compiled functions sort the keys of dictionaries
     return CageHistory(
         speed=trajectory.speed,
-        phase=float(trajectory.tau[-1] - trajectory.tau[0]),
+        phase=2 * np.pi * len(state) / trajectory.samples,
         position=position,
         velocity=velocity,
         forces={name: np.stack(along[name][:2], axis=1) for name in names},
@@ -114,7 +114,8 @@ class Measures(dict[str, Measured]):
 def measures(model: AbstractForcedSystem, trajectory: Trajectory) -> Measures:
     """Compute the quantities that a model reports of a time history.
 
-    **Arguments:** a cage or a whole bearing; its trajectory, preferably of whole revolutions without the transient.
+    **Arguments:** a cage or a whole bearing; its trajectory, preferably of whole revolutions without the transient, and
+    with 512 samples per revolution where a cage touches its land.
 
     **Returns:** `Measures`, quantities [SI] by name, with their standard errors for a whole bearing.
 

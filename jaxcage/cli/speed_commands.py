@@ -48,10 +48,11 @@ def simulate(
     of a bearing with its rollers, or as many as --discard says.
     """
     model, at, method = subject.model, subject.speed(speed), run.method
-    steps = getattr(method, "steps", 128)  # of equal steps the samples must divide the number
+    most = subject.usual(512, 128)
+    steps = getattr(method, "steps", most)  # of equal steps the samples must divide the number
     started = subject.usual(50, 20) if run.discard is None else run.discard
     length: dict[str, Any] = {"revolutions": run.revolutions or 20, "discard": started}
-    samples = max(n for n in range(1, min(128, steps) + 1) if steps % n == 0)
+    samples = max(n for n in range(1, min(most, steps) + 1) if steps % n == 0)
     found = jc.simulate(model, at, **length, samples=samples, method=method)
     where = subject.at(at)
     if found.outcome not in ("successful", "inaccurate"):
@@ -278,7 +279,7 @@ def runup(
     steps: o.StepOptions = o.StepOptions(),
     show: o.ShowOptions = o.ShowOptions(),
 ) -> Answer:
-    """Run-up and run-down at a constant rate: where the motion differs between both.
+    """Run-up and run-down by equal steps of speed in every revolution: where the motion differs between both.
 
     Args:
         rate: Speed gained per second [rpm/s], in the mean over the ramp, of the speed that bare numbers are.

@@ -208,7 +208,7 @@ class _AroundEdges:
         raise NotImplementedError
 
     def _nearest(self, place: np.ndarray) -> _Anchor:
-        return min(self._anchors, key=lambda a: float(np.sum((a.place - place) ** 2)))
+        return min(reversed(self._anchors), key=lambda a: float(np.sum((a.place - place) ** 2)))  # of equals the last
 
     def _followed(self, near: _Anchor, place: np.ndarray) -> dict[str, Followed]:
         """Follow the edges of an anchor to a place."""
@@ -423,12 +423,13 @@ class OperatingRange(_AroundEdges):
         return np.concatenate(speeds), np.concatenate([first, through.sizes[inside], last])
 
     def _stable_ends(self, place: np.ndarray, edges: Mapping[str, Sensitivity | None]) -> bool:
-        """True if the orbits at the ends of the margins are stable, where the edges lie beyond them."""
+        """True if the orbits reach the ends of the margins and are stable there, where the edges lie beyond them."""
         through = self.through(place)
         for name, end, sign in (("lower", self.wider[0], 1.0), ("upper", self.wider[1], -1.0)):
             edge = edges[name]
             if through is not None and (edge is None or sign * (end - edge.value_rpm / RPM) > BESIDE * end):
-                if through.size(through.orbit(end), "multiplier") >= 1:
+                reached = through.speeds[0] <= end * (1 + BESIDE) and end * (1 - BESIDE) <= through.speeds[-1]
+                if not reached or through.size(through.orbit(end), "multiplier") >= 1:
                     return False
         return True
 

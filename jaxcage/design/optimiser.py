@@ -119,6 +119,13 @@ class Problem:
     tolerance: dict[str, Tolerance]
     trials: dict[bytes, Trial] = dataclasses.field(default_factory=dict)
     solved: dict[bytes, dict[str, Value] | str] = dataclasses.field(default_factory=dict)
+    before: int = 0
+    """Number of designs solved for before `solved`."""
+
+    @property
+    def evaluations(self) -> int:
+        """Number of designs whose edges were solved for."""
+        return self.before + len(self.solved)
 
     @property
     def space(self) -> DesignSpace:
@@ -135,12 +142,16 @@ class Problem:
     def begin(self, place: np.ndarray, across: bool = False) -> Trial:
         """Trial at the first place of a search: edges that jumped on the way to it are accepted, and so are, `across`
         an unstable range that has appeared, those that now bound the stable range."""
-        trial, key = self.at(place), place.tobytes()
-        if isinstance(self.range, OperatingRange) and (trial.lost or (across and self.born(trial) < 0)):
+        trial = self.at(place)
+        return self.again(place) if trial.lost or (across and self.born(trial) < 0) else trial
+
+    def again(self, place: np.ndarray) -> Trial:
+        """Trial at a place, and values of designs from now on, with the edges that a search finds there."""
+        if isinstance(self.range, OperatingRange):
             self.range.begin(place)
-            del self.trials[key], self.solved[key]
-            trial = self.at(place)
-        return trial
+            self.trials.pop(place.tobytes())
+            self.before, self.solved = self.evaluations, {}
+        return self.at(place)
 
     def born(self, trial: Trial) -> float:
         """Slack of the requirement that no unstable range appears within the operating range."""
@@ -258,6 +269,8 @@ def design_for(
     told = lambda i: lambda done: say(f"search {i}", done, ITERATIONS)
     found = [SEARCHES[search](problem, begin, told(i)) for i, begin in enumerate(places, start=1)]
     best = min(found, key=lambda place: _merit(problem, place))
+    if any(name.endswith("margin") and np.isnan(value.rpm) for name, value in problem.at(best).values.items()):
+        problem.again(best)  # an edge may have come in where the range was open
     checked = check_design(space.model(best), operating, check, say) if check and not problem.at(best).lost else None
     return _described(problem, best, checked)
 
@@ -462,7 +475,7 @@ def _described(problem: Problem, best: np.ndarray, checked: Checked | None) -> D
         worst=trial.worst,
         budget=_budget(problem, trial) if wanted and feasible else [],
         notes=tuple(dict.fromkeys(problem.range.handed_over)),
-        evaluations=len(problem.solved),
+        evaluations=problem.evaluations,
         path=[space.values(t.place) | {"cost": t.cost} for t in problem.trials.values() if not t.lost],
         checked=checked,
         lost=trial.lost,

@@ -119,7 +119,7 @@ def _windows(model: AbstractForcedSystem, run: Trajectory, count: int) -> xr.Dat
     found = {
         "size": of_window("m", "size of the motion of the cage centre", size(place.reshape(count, -1, 2))),
         "scatter": of_window("m", "difference of the halves of a window", np.abs(half[:, 1] - half[:, 0])),
-        "eccentricity": of_window("1", "largest eccentricity ratio", np.hypot(*place.T).reshape(count, -1).max(axis=1)),
+        "eccentricity": of_window("1", "largest eccentricity ratio", run.peaks[:n, -1].reshape(count, -1).max(axis=1)),
     }
     speed = run.speed[:n].reshape(count, -1).mean(axis=1)
     if model.quantities:
