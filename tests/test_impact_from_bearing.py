@@ -169,7 +169,8 @@ def test_what_a_file_gives_wins_over_its_material():
     assert float(model.cage_inertia) == pytest.approx(0.06 * float(cage_body(model.bearing, 0.45e-3).gyration))
     made = float(pocket_stiffness(model.bearing, model.guidance_gap, 11e9))
     assert float(model.pockets.pocket_stiffness) == pytest.approx(made)
-    assert describe(whole).estimated[-3:] == ("cage_mass", "cage_inertia", "pockets.pocket_stiffness")
+    names = ("cage_mass", "cage_inertia", "pockets.pocket_stiffness", "wear.hardness")
+    assert describe(whole).estimated[-4:] == names
     assert float(model_from({"base": "1a", "material": "PA66"}).cage_mass) == pytest.approx(0.04, rel=0.1)
 
 

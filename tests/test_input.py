@@ -67,7 +67,7 @@ REFUSED = {
     "simulate 1a --speed 9000 --load 3": "Option --load goes with a bearing with its rollers, but 1a is a cage.",
     "gradient 1a --load 3": "Option --load goes with a bearing with its rollers, but 1a is a cage.",
     "compare 1a nu2310": "Case 'nu2310' must be a cage, as the first one is: two of a kind are compared.",
-    "sweep 1a --first 9000 --last 3000": "Option --last must be above --first, but the range is 9000 to 3000 rpm.",
+    "sweep 1a --first 9000 --last 3000": "above --first, but the range is 9000 to 3000 rpm of the cage.",
     "sweep 1a --first 1.500": 'but is "1.500": write 1500 or 1.5, whichever is meant.',
     "check 1a --operating 1.500-3.600rpm": '"1.500-3.600rpm" is "1.500 rpm": write 1500 or 1.5, whichever is meant.',
     "identify 1a none.csv": 'with ranges, such as stiffness = "1e4 .. 1e6 N/m", but has none.',

@@ -190,6 +190,10 @@ def check_case(given: str, speeds: dict[str, float | None]) -> "Description":
         known = ", ".join([*cases, *bearings])
         raise InputError(f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file.")
     found = describe({"base": given.lower()}) if listed else read_description(given)
+    first, last = speeds.get("first"), speeds.get("last")
+    if first and last and last <= first and type(first) is type(last):
+        between = f"{first:g} to {last:g} rpm of the {getattr(first, 'whose', found.speeds)}"
+        raise InputError(f"Option --last must be above --first, but the range is {between}.")
     n = found.numbers
     if n.get("guidance") == "inner" or "outer_speed" in n:  # `Subject.rpm` knows them
         return found

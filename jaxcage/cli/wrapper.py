@@ -95,11 +95,7 @@ def _run(call: functools.partial[Answer]) -> None:
     speeds = {"speed": call.keywords.get("speed")}
     over = call.keywords.get("over")
     if over is not None and over != inspect.signature(call.func).parameters["over"].default:
-        speeds |= {"first": over.first, "last": over.last}
-        if over.last <= over.first and type(over.last) is type(over.first) and over.count != 1:
-            raise InputError(
-                f"Option --last must be above --first, but the range is {over.first:g} to {over.last:g} rpm."
-            )
+        speeds |= {"first": over.first, "last": None if over.count == 1 else over.last}
     operating = call.keywords.get("operating") or getattr(call.keywords.get("calm"), "operating", None)
     if operating is not None:
         speeds["operating"] = operating[1]
