@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 import reference
 from helpers import document
+from scipy.integrate import solve_bvp
 
 import jaxcage as jc
-from jaxcage.bearing import bar_stiffness, cage_body, cage_materials, listed, pocket_stiffness
+from jaxcage.bearing import bar_stiffness, bar_stress, cage_body, cage_materials, listed, pocket_stiffness
 from jaxcage.cli import main
 from jaxcage.files import ConfigError, describe, model_from, template, write_template
 from jaxcage.forces import PocketImpact, bar_pulse, impact_history
@@ -160,6 +161,18 @@ def test_mass_and_stiffness_follow_from_the_material():
     assert float(peek.impact.cage_modulus) == 11e9
     ratio = float(amplitude(peek, 1000.0) / amplitude(brass, 1000.0))
     assert 1510 / 8430 < ratio < 1  # the lighter cage gives way; the roller weighs as much
+
+
+def test_bending_stress_of_a_bar():
+    """Beside that of a clamped beam under an even load, whose equation E I w(4) = q SciPy solves."""
+    body, force, stiff = cage_body(jc.whole_bearing("nu2310").bearing, 0.45e-3), 250.0, 102e9
+    length, thickness, height = (float(x) for x in body[:3])
+    inertia, x = height * thickness**3 / 12, np.linspace(0.0, length, 33)
+    beam = lambda x, w: np.stack([w[1], w[2], w[3], np.full_like(x, force / length / (stiff * inertia))])
+    ends = lambda a, b: np.array([a[0], a[1], b[0], b[1]])
+    w = solve_bvp(beam, ends, x, np.zeros((4, x.size)), tol=1e-8).sol(x)
+    stress = np.max(np.abs(stiff * inertia * w[2])) * thickness / 2 / inertia
+    assert float(bar_stress(body, force)) == pytest.approx(stress, rel=1e-6)
 
 
 def test_what_a_file_gives_wins_over_its_material():

@@ -7,7 +7,7 @@
 | `oil` | viscosity of the oil at its temperature (ASTM D341), oils by grade |
 | `oil_drag` | drag of the oil on rollers, rolling resistance |
 | `statics` | load distribution, loaded zone, static cage displacement: (1), (2), (5), (6) |
-| `cage_body` | shape of a cage estimated from the dimensions of its bearing, stiffness of its bars |
+| `cage_body` | shape of a cage estimated from the dimensions of its bearing, stiffness and stress of its bars |
 | `catalogue` | bearings by designation with ratings and minimum loads; the published cases and figure axes |
 """
 
@@ -19,6 +19,7 @@ from .._bearing_data import (
 from .cage_body import (
     CageBody as CageBody,
     bar_stiffness as bar_stiffness,
+    bar_stress as bar_stress,
     cage_body as cage_body,
     pocket_stiffness as pocket_stiffness,
 )

@@ -48,6 +48,12 @@ def cage_body(bearing: Bearing, guidance_gap: Scalar, inner_land: Scalar | None 
     return CageBody(jnp.asarray(b.roller_length), thickness, height, volume, (outer**2 + inner**2) / 2)
 
 
+def bar_stress(body: CageBody, force: Scalar) -> Array:
+    """Largest bending stress [Pa] of a bar that is clamped at both ends, under a force [N] spread evenly over it: the
+    moment F l/12 at its ends over the section modulus height thickness^2/6."""
+    return force * body.bar_length / (2 * body.bar_height * body.bar_thickness**2)
+
+
 def pocket_stiffness(bearing: Bearing, guidance_gap: Scalar, youngs_modulus: Scalar) -> Array:
     """Stiffness of a bar under a roller [N/m]: bending, shear and line contact in series.
 

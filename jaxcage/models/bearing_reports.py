@@ -107,6 +107,7 @@ _mean: Callable[[str], _Of] = lambda name: lambda a: a.mean(name)
 _most: Callable[[str], _Of] = lambda name: lambda a: a.largest[name]
 _turn: Callable[[str], _Of] = lambda name: lambda a: a.per_revolution(name)
 _worn: Callable[[str], _Of] = lambda name: lambda a: a.numbers["wear_mm3_per_h_per_W"] * a.mean(f"{name}_rubbing")
+_bent: _Of = lambda a: a.numbers["bar_stress_MPa_per_N"] * a.largest["pocket_force"]
 _slip: _Of = lambda a: 1 - 2 * np.pi * a.revolutions / a.integrals["time"] / np.abs(a.numbers["rolling_cage_speed"])
 _variance: _Of = lambda a: a.mean("eccentricity_squared") - a.mean("eccentricity") ** 2
 _deviation: _Of = lambda a: np.sqrt(np.maximum(_variance(a), 0.0))
@@ -124,6 +125,7 @@ _ROWS: dict[str, tuple[str, str, _Of]] = {
     "roller_slip_max": ("1", "largest slip of a roller's spin against pure rolling", _most("roller_slip")),
     "pocket_force_max_N": ("N", "largest pocket force", _most("pocket_force")),
     "pocket_force_peak_N": ("N", _GROWS.format("pocket"), _most("pocket_force")),
+    "bar_stress_max_MPa": ("MPa", "bending stress of a bar under the largest pocket force", _bent),
     "pocket_force_mean_sum_N": ("N", "mean of the sum of all pocket forces", _mean("pocket_force")),
     "land_force_max_N": ("N", "largest force of the land on the cage", _most("land_force")),
     "land_force_peak_N": ("N", _GROWS.format("land"), _most("land_force")),
