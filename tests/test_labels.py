@@ -219,7 +219,7 @@ def test_chaos_that_lasts_and_chaos_that_dies_out_make_zones_of_their_own():
 
 
 def test_a_window_that_no_speed_makes_certain_is_closed():
-    """At the five speeds in the middle 14 of 20 lanes leave chaos late, or all of them leave it soon."""
+    """Either 14 of the 20 lanes at the five middle speeds leave chaos late, or all of them leave it soon."""
     sweep = made("11###########11", initial_states=20)
     sweep = sweep.isel(initial_state=np.zeros(20, dtype=int))
     for leaving, at, count in ((14, 1520.0, 1), (20, 320.0, 2)):
@@ -279,7 +279,7 @@ def test_map_of_a_system_agrees_with_a_sweep():
 
 
 def test_the_exponent_of_a_stretch_has_the_error_of_its_speeds():
-    """How it grows from one speed to the next is no error of its mean."""
+    """The mean has no error from the growth of the exponent with speed."""
     growth = np.array([[50.0, 52.0], [30.0, 32.0]])
     data = {"label": (("speed", "initial_state"), np.full((2, 1), "disordered"))}
     data |= {"block_growth": (("speed", "initial_state", "growth_block", "exponent"), growth[:, None, :, None])}

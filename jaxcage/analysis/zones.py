@@ -299,8 +299,8 @@ def _kind(sweep: xr.Dataset, label: np.ndarray, i: int) -> tuple[tuple[str, ...]
 
 
 def _exponent(sweep: xr.Dataset, speeds: slice) -> tuple[float, float]:
-    """Mean over some speeds of the largest exponent, that of all blocks at a speed, and its standard error from the
-    scatter at each speed; NaN with fewer than two blocks."""
+    """Return the mean of the largest exponent over speeds, and its standard error from the scatter of the blocks at
+    each speed; NaN if no speed has two blocks."""
     blocks = (each[np.isfinite(each)] for each in sweep["block_growth"].values[speeds][..., :1])
     known = [each for each in blocks if each.size > 1]
     if not known:

@@ -207,13 +207,10 @@ class BearingModel(AbstractForcedSystem):
                 )
 
     def reference(self, speed: Scalar) -> dict[str, Scalar]:
-        body = cage_body(
-            self.bearing, self.guidance_gap, self.inner_land_diameter if self.guidance == "inner" else None
-        )
         return {
             "rolling_cage_speed": self.rolling_cage_speed(speed),
             "relative_speed": jnp.abs(speed - self.outer_speed),
-            "bar_stress_MPa_per_N": 1e-6 * bar_stress(body, 1.0),
+            "bar_stress_MPa_per_N": 1e-6 * bar_stress(cage_body(self.bearing, self.guidance_gap), 1.0),
             "wear_mm3_per_h_per_W": 1e9 * 3600 * self.wear.volume(1.0),
         }
 
