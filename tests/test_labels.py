@@ -15,6 +15,7 @@ from jaxcage.analysis import (
     decay,
     label_lanes,
     lasting,
+    motion_label,
     on_torus,
     restless,
     small,
@@ -285,3 +286,18 @@ def test_the_exponent_of_a_stretch_has_the_error_of_its_speeds():
     data |= {"block_growth": (("speed", "initial_state", "growth_block", "exponent"), growth[:, None, :, None])}
     (found,) = jc.stretches(xr.Dataset(data, coords={"rpm": ("speed", [1000.0, 2000.0])}))
     assert (found.exponent, found.exponent_error) == pytest.approx((41.0, np.sqrt(2) / 2))
+
+
+@pytest.mark.parametrize("revolutions", [20, 200])
+def test_a_motion_near_a_limit_is_undecided(revolutions: int):
+    """Scatter about a fixed place, with a mean distance of positions one revolution apart of sigma sqrt(pi): a limit
+    within two standard errors of the mean is kept from nine of ten records that lie on it, and none far from it."""
+
+    def labels(mean: float) -> list[str]:
+        rng, records = np.random.default_rng(5), range(100)
+        shape = (64 * revolutions + 1, 2)
+        return [motion_label([0.5, 0.0] + mean / np.sqrt(np.pi) * rng.standard_normal(shape), 64) for _ in records]
+
+    assert set(labels(0.08)) == {"locally_periodic"} and set(labels(0.12)) == {"disordered"}
+    assert labels(0.1).count("undecided") >= 80
+    assert set(labels(0.104)) == ({"disordered"} if revolutions > 100 else {"disordered", "undecided"})

@@ -7,6 +7,9 @@ lane that closes although neighbouring trajectories diverge is undecided: its mo
 is on an unstable orbit. `lanes.dataset` makes a chaotic lane `transient` if it calms down before the horizon.
 """
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
@@ -181,6 +184,8 @@ CIRCULAR, REPEATING = 0.1, 0.1
 """Largest variation of the eccentricity relative to its mean for `circular` motion; largest mean distance in
 clearances between positions one revolution apart for `locally_periodic` motion."""
 MOTIONS = ("circular", "locally_periodic", "disordered")
+PARTS = 8
+"""Largest number of parts of a record from which the standard error of a statistic is estimated."""
 
 
 def motion_label(place: Float[np.ndarray, "n 2"], samples: int) -> str:
@@ -188,7 +193,8 @@ def motion_label(place: Float[np.ndarray, "n 2"], samples: int) -> str:
 
     `circular`: the centre whirls at least once in ten revolutions of the cage (and once in all), and its eccentricity
     varies (standard deviation over mean) by less than `CIRCULAR`. `locally_periodic`: otherwise, if the mean distance
-    of positions one revolution apart is below `REPEATING` clearances. `disordered`: neither. `failed`: not finite.
+    of positions one revolution apart is below `REPEATING` clearances. `disordered`: neither. `undecided`: a statistic
+    that decides is within two standard errors of its limit. `failed`: not finite.
 
     **Arguments:** position over clearance, at equal angles of the cage; samples per revolution.
     """
@@ -197,12 +203,28 @@ def motion_label(place: Float[np.ndarray, "n 2"], samples: int) -> str:
     eps = np.hypot(*place.T)
     turns = abs(np.diff(np.unwrap(np.arctan2(place[:, 1], place[:, 0]))).sum()) / (2 * np.pi)
     revolutions = (len(place) - 1) / samples
-    if turns >= max(1.0, revolutions / 10) and np.std(eps) < CIRCULAR * np.mean(eps):
-        return "circular"
-    if len(place) <= samples:
-        return "disordered"
     away = np.hypot(*(place[samples:] - place[:-samples]).T)
-    return "locally_periodic" if np.mean(away) < REPEATING else "disordered"
+    repeats = _below(REPEATING, away, np.mean, samples)
+    if turns >= max(1.0, revolutions / 10):
+        steady = _below(CIRCULAR, eps, lambda x: np.std(x) / np.mean(x), samples)
+        if steady:
+            return "circular"
+        repeats = None if steady is None and not repeats else repeats
+    return {True: "locally_periodic", False: "disordered", None: "undecided"}[repeats]
+
+
+def _below(limit: float, x: Float[np.ndarray, " n"], statistic: Callable[..., Any], samples: int) -> bool | None:
+    """Whether a statistic of a record is below a limit, or None if it is within two standard errors of it.
+
+    The error is the jackknife's: from the statistic without one after the other of the parts of a revolution or more.
+    """
+    count = min(PARTS, len(x) // samples)
+    if count < 2:
+        return None
+    parts = np.array_split(x, count)
+    value, without = statistic(x), [statistic(np.concatenate(parts[:i] + parts[i + 1 :])) for i in range(count)]
+    error = np.sqrt(count - 1) * np.std(without)
+    return None if abs(value - limit) <= 2 * error else bool(value < limit)
 
 
 LABELS = (

@@ -23,7 +23,7 @@ from .subject import RPM, Subject
 
 SPEEDS = 9
 """Speeds at which a bearing with its rollers is simulated."""
-LENGTH: dict[str, Any] = {"initial_states": 2, "discard": 30, "revolutions": 20, "blocks": 4, "exponents": 0}
+LENGTH: dict[str, Any] = {"initial_states": 2, "discard": 30, "revolutions": 80, "blocks": 4, "exponents": 0}
 FOLLOWED = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
 """Edges that are followed across the map, which takes about a minute each."""
 

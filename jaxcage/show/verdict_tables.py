@@ -127,13 +127,14 @@ def indices_note(rows: Sequence[Index]) -> str:
     return f"Measure {rows[0].label} first: {rows[0].source}"
 
 
-MOTIONS = {"locally_periodic": "calm", "circular": "circling", "disordered": "rattling"}
+MOTIONS = {"locally_periodic": "calm", "circular": "circling", "disordered": "rattling", "undecided": "undecided"}
 """Plain words for the motions of a cage among its rollers, by the names of `jaxcage.analysis.motion_label`."""
 BY_CAGE_MODEL = 'The cage model prescribes the impacts of the rollers; slip and forces: a file with model = "bearing"'
 MOTION_WORDS = {
     "locally_periodic": "a revolution later the centre of the cage is within a tenth of the clearance of where it was",
     "circular": "the centre whirls around the guide at an almost constant distance from the middle",
     "disordered": "neither: the cage wanders or bounces in its guide",
+    "undecided": "within two standard errors of a limit between these",
 }
 """Meaning of each motion."""
 
@@ -145,12 +146,11 @@ def motion_words(labels: Sequence[str]) -> str:
 
 def cage_verdict(found: xr.Dataset) -> str:
     """Verdict over all speeds and initial states: `calm`, `circling`, `rattles` or `rattles in part`; `not decided` if
-    simulations failed and none of the others rattles."""
-    label = found["label"].values
-    some = [name for name in MOTIONS if np.any(label == name)]
+    simulations failed or are undecided and none of the others rattles."""
+    some = set(found["label"].values.ravel().tolist())
     if "disordered" in some:
-        return "rattles" if some == ["disordered"] else "rattles in part"
-    if np.any(label == "failed"):
+        return "rattles" if some <= {"disordered", "failed"} else "rattles in part"
+    if some & {"failed", "undecided"}:
         return "not decided"
     return "circling" if "circular" in some else "calm"
 
@@ -175,7 +175,7 @@ def motion_table(title: str, found: xr.Dataset) -> Table:
     rows = []
     for i, rpm in enumerate(found["rpm"].values):
         at = found.isel(speed=i)
-        names = [MOTIONS.get(str(name), "failed") for name in at["label"].values.ravel()]
+        names = [MOTIONS.get(str(name), str(name)) for name in at["label"].values.ravel()]
         row: dict[str, Any] = {"rpm": float(rpm), "motion": ", ".join(dict.fromkeys(names))}
         rows.append(row | {name: float(np.nanmean(at[name].values)) for name in READ if name in found})
     columns = [Column("shaft [rpm]", "rpm", digits=0), Column("motion of the cage", "motion")]
