@@ -45,10 +45,15 @@ def head_of(name: str, unit: str) -> str:
     return name.removesuffix("_" + unit.replace(" ", "_").replace("^", "").replace("/", "_per_")).replace("_", " ")
 
 
+def in_per_cent(name: str, unit: str) -> tuple[float, str]:
+    """Factor and unit with which a quantity is shown: per cent for shares."""
+    return (100.0, "%") if name in SHARES else (1.0, unit)
+
+
 def quantity_words(found: Measured) -> str:
     """A quantity in a sentence, with its error: `friction power 1187.0 ± 1.2 W` or `cage slip 2.11 ± 0.12 %`."""
     quantity, value, error = found
-    times, unit = (100, "%") if quantity.name in SHARES else (1, quantity.unit)
+    times, unit = in_per_cent(quantity.name, quantity.unit)
     return f"{head_of(quantity.name, quantity.unit)} {number(times * value, times * error)} {unit}".removesuffix(" 1")
 
 
@@ -79,10 +84,12 @@ def means_table(designs: Sequence[str], found: Sequence[xr.Dataset], names: Sequ
     rows = []
     for name in names:
         column = column_of(found[0], name)
-        row: dict[str, Any] = {"measure": column.head, "unit": column.unit}
+        times, unit = in_per_cent(name, column.unit)
+        row: dict[str, Any] = {"measure": column.head, "unit": unit}
         for design, data in zip(designs, found, strict=True):
             values, errors = mean_over_starts(data, name)
-            row |= {design: np.nanmean(values), f"{design}_error": np.sqrt(np.sum(errors**2)) / errors.size}
+            error = np.sqrt(np.sum(errors**2)) / errors.size
+            row |= {design: times * np.nanmean(values), f"{design}_error": times * error}
         rows.append(row)
     columns = (Column(name, unit=OWN, error=f"{name}_error") for name in designs)
     return table("Means over speed", rows, ["measure", UNIT, *columns], "means")
@@ -91,7 +98,8 @@ def means_table(designs: Sequence[str], found: Sequence[xr.Dataset], names: Sequ
 def run_tables(title: str, found: Measures, rollers: Rollers | None) -> list[Table]:
     """Tables of quantities of one run with standard errors, and of spectral lines with the bearing's frequencies."""
     words = lambda q: q.text if len(q.text) <= LONGEST else head_of(q.name, q.unit)
-    tables = [_values_table(title, ((words(q), value, q.unit, error) for q, value, error in found.values()))]
+    rows = ((words(q), *in_per_cent(q.name, q.unit), value, error) for q, value, error in found.values())
+    tables = [_values_table(title, ((what, times * x, unit, times * error) for what, times, unit, x, error in rows))]
     columns = [Column("order of the cage's speed", "order", digits=3), "amplitude"]
     if rollers is None:
         return tables
