@@ -47,10 +47,21 @@ _NO_NUMBERS = (str, bytes, bool, complex, list, tuple, dict, set, np.ma.MaskedAr
 
 
 def _leaf_of(info: "ParameterInfo", x: Any) -> Any:
-    """Convert the value of a declared parameter. **Raises:** `ValueError` unless it is real, a number or an array."""
+    """Convert the value of a declared parameter. **Raises:** `ValueError` unless it is real, a number or an array,
+    and within its range; traced ones pass."""
     if isinstance(x, _NO_NUMBERS) or (isinstance(x, np.ndarray | np.generic) and x.dtype.kind not in "iuf"):
         raise InputError(f"The {info.text} {allowed(info)}, but {x!r} was given.")
+    if (wrong := _out_of_range(x, info)) is not None:
+        raise InputError(f"The {info.text} {allowed(info)}, but {wrong:g} was given.")
     return _as_leaf(x)
+
+
+def _out_of_range(x: Any, info: "ParameterInfo") -> float | None:
+    """First number of `x` out of the range of a parameter, None if there is none or it is traced."""
+    if isinstance(x, Tracer) or not isinstance(x, int | float | np.ndarray | np.generic | jax.Array):
+        return None
+    numbers = np.asarray(x, dtype=float)
+    return next(iter(numbers[~within(numbers, info.lower, info.upper)].flat), None)
 
 
 def parameter(
@@ -285,12 +296,8 @@ def replace(module: M, **values: PyTree) -> M:
         if (offered := metadata.get("choice")) and value not in offered:
             raise ArgumentError(name, said=f"must be one of {', '.join(offered)}, but {value!r} was given.")
         if info := metadata.get("parameter"):
-            _require_range(name, value, info)
-    changed = _changed(module, {(name,) if name in parts else paths[name]: value for name, value in values.items()})
-    for path, field in walk(changed) if parts & values.keys() else ():
-        if {path[0], "forces"} & values.keys() and (info := field.metadata.get("parameter")):
-            _require_range(".".join(path), get(changed, path), info)
-    return changed
+            require_range(name, value, info)
+    return _changed(module, {(name,) if name in parts else paths[name]: value for name, value in values.items()})
 
 
 def _changed(module: Any, changes: Mapping[tuple[str, ...], Any]) -> Any:
@@ -314,25 +321,21 @@ def _changed(module: Any, changes: Mapping[tuple[str, ...], Any]) -> Any:
     return copy
 
 
-def _require_range(name: str, value: Any, info: ParameterInfo) -> None:
+def require_range(name: str, value: Any, info: ParameterInfo) -> None:
     """Require a value within its range; traced ones pass. **Raises:** `ValueError` otherwise."""
     if isinstance(value, _NO_NUMBERS):
         raise ArgumentError(name, said=f"{allowed(info)}, but {reprlib.repr(value)} was given.")
-    if isinstance(value, Tracer) or not isinstance(value, int | float | np.ndarray | np.generic | jax.Array):
-        return
-    numbers = np.asarray(value, dtype=float)
-    wrong = numbers[~within(numbers, info.lower, info.upper)]
-    if wrong.size:
+    if (wrong := _out_of_range(value, info)) is not None:
         unit = "" if info.unit in ("1", UNKNOWN) else f" {info.unit}"
-        raise ArgumentError(name, said=f"{allowed(info)}, but is {wrong.flat[0]:g}{unit}.")
+        raise ArgumentError(name, said=f"{allowed(info)}, but is {wrong:g}{unit}.")
 
 
 Parameter = str | Callable[[Any], Any]
 """Name of a parameter, or a function that picks it from a model."""
 
 
-def pick(model: Any, parameter: Parameter) -> Callable[[Any], Any]:
-    """Function that picks a parameter from a model.
+def pick(model: Any, parameter: Parameter, name: str = "parameter") -> Callable[[Any], Any]:
+    """Function that picks a parameter, given as the argument `name`, from a model.
 
     **Raises:** `ValueError` for an unknown name, or a function that returns none of the model's numbers.
     """
@@ -340,12 +343,12 @@ def pick(model: Any, parameter: Parameter) -> Callable[[Any], Any]:
         picked = parameter(model)
         if not any(picked is leaf for leaf in jax.tree.leaves(model)) or jnp.ndim(picked):
             said = "must pick a number that the system holds as it is, such as `lambda s: s.acceleration.force`"
-            raise ArgumentError("parameter", said=f"{said}, but picks something else.")
+            raise ArgumentError(name, said=f"{said}, but picks something else.")
         return parameter
     paths = parameter_paths(model) or _by_field_name(model)
     if parameter not in paths:
         known = ", ".join(["speed", *paths])
-        raise ArgumentError("parameter", said=f"must be one of {known}, but '{parameter}' was given.")
+        raise ArgumentError(name, said=f"must be one of {known}, but '{parameter}' was given.")
     path = paths[parameter]
     return lambda m: get(m, path)
 

@@ -114,7 +114,7 @@ _QUANTITIES = (
     Quantity("exponent", r"$\lambda$", "1", "Lyapunov exponent per revolution"),
     Quantity("largest_exponent", r"$\lambda_1$", "1", "largest exponent per revolution"),
     Quantity("standard_error", r"$s_\lambda$", "1", "standard error of the exponents"),
-    Quantity("peak", r"$\epsilon$", "1", "largest excursion (cage: eccentricity ratio) observed"),
+    Quantity("peak", r"$\epsilon$", "1", "largest excursion observed (cage: eccentricity ratio; own system: 0)"),
     Quantity("error", "", "1", "largest error of a revolution, in units of the scale"),
     Quantity("doubt", "", "1", "error of the exponents that comes from the steps"),
     Quantity("steps", "", "1", "mean number of steps of a revolution"),

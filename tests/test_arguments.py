@@ -3,6 +3,7 @@
 import inspect
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jax
@@ -17,6 +18,7 @@ import jaxcage as jc
 DUFFING = jc.ForcedOscillator(lambda tau, q, v, speed: (-0.2 * v[0] - q[0] + 0.3 * jnp.cos(tau),), coordinates=1)
 SPEEDS = np.array([1.0, 1.1])
 CASE, WHOLE = jc.case("1a"), jc.whole_bearing("nu2310")
+study = partial(jc.study, store="nowhere", name="duffing", version="1")
 unwrap = inspect.unwrap
 """Without the types that tests check."""
 
@@ -28,6 +30,16 @@ unwrap = inspect.unwrap
         (lambda: jc.sweep(DUFFING, SPEEDS, blocks=7, revolutions=10), "divide"),
         (lambda: jc.sweep(DUFFING, SPEEDS, discard=2.5), "`discard` must be a whole number, but 2.5"),
         (lambda: jc.sweep(DUFFING, SPEEDS, exponents=3), "at most 2"),
+        (lambda: jc.sweep(DUFFING, SPEEDS, revolution=9), "`revolution` must be a setting of a run, one of: discard, "),
+        (lambda: jc.sweep(DUFFING, SPEEDS, tolerance=1e-9, method=jc.native()), "`method` and `tolerance` must not be"),
+        (lambda: jc.zones(jc.sweep(DUFFING, SPEEDS, exponents=0, discard=1, revolutions=20)), "at least one exponent"),
+        (lambda: study(CASE, {"speed": np.zeros(1)}), "`speed` must be positive and finite, .* but 0 was given"),
+        (lambda: study(CASE, {"speed": np.array([9000.0])}), "`speed` must be in rad/s"),
+        (
+            lambda: study(CASE, {"speed": 900 * SPEEDS, "guidance_gap": jc.files.Range(1e-4, 0.5)}, samples=8),
+            "`guidance_gap` must be a number from 1e-05 to 0.005 m, but is 0.5 m",
+        ),
+        (lambda: study(DUFFING, {"speed": SPEEDS, "gap": SPEEDS}), "`vary` must be one of speed, but 'gap' was given"),
         (lambda: jc.sweep(DUFFING, np.array([])), "at least one speed"),
         (lambda: jc.sweep(DUFFING, np.array([1.0, np.nan])), "positive and finite"),
         (lambda: jc.sweep(DUFFING, SPEEDS[::-1]), "ascending"),
@@ -55,6 +67,7 @@ unwrap = inspect.unwrap
         (lambda: jc.replace(CASE, guidance_gap=0.5), "`guidance_gap` must be a number from 1e-05 to 0.005 m"),
         (lambda: jc.replace(CASE, cage_mass=math.nan), "`cage_mass` must be a number from 0.001 to 100 kg"),
         (lambda: jc.bearing.Material("brass", 1e11), "must be a number from .* but 'brass' was given"),
+        (lambda: jc.bearing.Material(7800.0, -1.0), "must be a number from .* but -1 was given"),
         (lambda: jc.ForcedOscillator(3, coordinates=1), "`acceleration` must be something that can be called, but 3"),
         (lambda: jc.ForcedSystem(DUFFING.acceleration, 2.5), "`dimension` must be a whole number"),
     ],

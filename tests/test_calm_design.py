@@ -299,6 +299,7 @@ def test_requirements_that_exclude_each_other_are_named():
     assert [found.values[n] for n in ("x", "y")] == pytest.approx([1.125, 1.0], abs=1e-4)
     assert found.short == pytest.approx({LOWER: 3.75, UPPER: 3.75}, abs=1e-2)
     assert set(found.conflict) == {LOWER, UPPER, "the bound of y"}
+    assert "in conflict: " in str(found) and "and the bound of y" in str(found)
 
 
 def test_the_least_width_of_an_unstable_range():

@@ -122,10 +122,14 @@ def test_bad_arguments(fold):
     limits = dict(lower=0.2, upper=0.4, x_lower=1.0, x_upper=3.0, method=METHOD)
     for system, y, wrong, sentence in (
         (hardening(), "g", dict(lower=0.4, upper=0.2), "`x_lower` and `x_upper` must be in ascending order"),
-        (hardening(), "stiffness", {}, "`parameter` must be one of speed, m, d, k, b, g, but 'stiffness'"),
+        (hardening(), "g", dict(upper=np.inf), "`x_lower` and `x_upper` must be in ascending order and finite"),
+        (hardening(), "stiffness", {}, "`y` must be one of speed, m, d, k, b, g, but 'stiffness'"),
+        (hardening(), "speed", {}, "`x` and `y` must be the parameter of the point, speed, and another one, but"),
         (hardening(d=2.0), "g", {}, "`point` must be a fold of the system, but Newton's method finds none there"),
         (hardening(0.02), "g", {}, "must have the system's g between them, 0.02, but are 0.2 and 0.4"),
         (hardening(), "g", dict(x_upper=1.2), "`point` must begin from 1 to 1.2"),
     ):
         with pytest.raises(ValueError, match=sentence):
             jc.curve(system, fold, "speed", y, **(limits | wrong))
+    with pytest.raises(ValueError, match="`x` and `y` must be the parameter of the point, speed, and another"):
+        jc.curve(hardening(), fold, "g", "b", **limits)

@@ -203,16 +203,16 @@ def test_impact_against_scipy_and_its_energy(samples, tolerance):
     np.testing.assert_allclose(energy, 0.5 * ROLLER * SPEED**2, rtol=tolerance / 10)
 
 
-RIGID = PocketImpact(contact_stiffness=1e6, bar_stiffness=1e12, bar_mass=100.0, approach_ratio=0.6)
+RIGID = PocketImpact(contact_stiffness=1e4, bar_stiffness=1e10, bar_mass=1.0, approach_ratio=0.6)
 
 
 @pytest.mark.wide
 def test_rigid_bar_gives_the_hertz_impact_in_closed_form():
     """m v^2/2 = (9/19) K d^(19/9), and the time 2 (d/v) sqrt(pi) G(1 + 1/p)/G(1/2 + 1/p)."""
-    v0, k = SPEED, 1e6
+    v0, k = SPEED, 1e4
     h = history(RIGID, samples=4097, substeps=1)
     depth = (19 / 18 * ROLLER * v0**2 / k) ** (9 / 19)
-    # A bar of 1e12 N/m gives way by 3e-7 of the depth.
+    # The bar gives way by 4e-7 of the depth.
     assert float(h.contact_force.max()) == pytest.approx(k * depth ** (10 / 9), rel=1e-5)
     p = 19 / 9
     duration = 2 * depth / v0 * np.sqrt(np.pi) * gamma(1 + 1 / p) / gamma(0.5 + 1 / p)

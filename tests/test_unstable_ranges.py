@@ -201,7 +201,7 @@ def test_synchronous_orbits_of_the_hardening_duffing(hardening):
     assert abs(low.lower_rpm - LOWER / PER_RPM) < 1e-9 and abs(high.upper_rpm - UPPER / PER_RPM) < 1e-9
     assert low.family == high.family and hardening.missed == 0
     np.testing.assert_allclose([p.speed for p in hardening.edges], FOLDS, rtol=0, atol=1e-6)
-    assert len(hardening.points) == 2
+    assert len(hardening.points) == 2 and [len(hardening.coexisting(v)) for v in (LOWER, 1.6, UPPER)] == [1, 3, 1]
     # Every simulation is on one of the two, and from the first start each speed is counted once.
     periodic = hardening.sweep.label == "periodic-1"
     assert low.met + high.met == np.sum(periodic) >= 0.9 * periodic.size

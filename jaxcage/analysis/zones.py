@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Bool, Float
 
+from .._errors import ArgumentError
 from ..quantities import notebook_html
 from .labels import CHAOS_THRESHOLD
 from .sweep import chaotic_share, failed, lasting, resolution_rpm, restless, survival_at
@@ -221,6 +222,8 @@ def zones(sweep: xr.Dataset, close_below_rpm: float | None = None) -> Zones:
     larger, the distance to the first speed on either side at which the interval of the mean life (95 %) excludes the
     horizon.
     """
+    if not sweep.sizes["exponent"]:
+        raise ArgumentError("sweep", said="must have at least one exponent, but has none.")
     rpm, label = sweep["rpm"].values, sweep["label"].values
     close_below_rpm = closing_width(rpm) if close_below_rpm is None else close_below_rpm
     lasts, chaotic, sound = lasting(sweep), restless(sweep), np.all(~failed(sweep), axis=1)

@@ -102,6 +102,7 @@ class Design:
             unit = "" if r.unit == "1" else f" {r.unit}"
             was, now = (f"{x[r.of].value:.4g}" if r.of in x else "unknown" for x in (self.before, self.after))
             rows.append(f"  {r.name}: {was} -> {now}{unit} (limit {r.limit:.4g})")
+        rows += [f"  in conflict: {' and '.join(self.conflict)}"] if self.conflict else []
         rows += [f"  {self.lost}"] if self.lost else []
         return "\n".join(rows)
 

@@ -18,10 +18,10 @@ from jaxtyping import Float, Int
 
 from .._arguments import require_at_least
 from .._errors import ArgumentError
-from .._parameters import pick
+from .._parameters import parameter_info, pick, require_range
 from ..bearing import vg
 from ..files import Range
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, require_speeds
 from ..solve import Lanes
 from .plan import SPEED, START, Plan, own_states
 
@@ -146,10 +146,17 @@ class Grid:
         return {**sampled, **{name: values[place[name]] for name, values in self.values.items()}}, place[START]
 
     def require_known(self, model: AbstractForcedSystem) -> None:
-        """Raise `ValueError` for a parameter that the model does not have, or more initial states than it has."""
-        for name in self.names:
-            if name not in (SPEED, OIL):
-                pick(model, name)
+        """Raise `ValueError` for a parameter that the model does not have, a value that it must not have, or more
+        initial states than it has."""
+        declared = parameter_info(model)
+        for name, given in {**self.sampled, **self.values}.items():
+            values = np.array([given.lower, given.upper]) if isinstance(given, Range) else given
+            if name == SPEED:
+                require_speeds(model, values)
+            elif name != OIL:
+                pick(model, name, "vary")
+                if name in declared:
+                    require_range(name, values, declared[name])
         if OIL in self.names and not hasattr(model, "lubricant"):
             raise ArgumentError("vary", said=f"must not hold {OIL} for a model without oil.")
         if self.initial_states > (own := len(model.initial_states(1.0))):

@@ -10,6 +10,10 @@ from ..models import AbstractForcedSystem
 from ..solve import AbstractMethod, native
 
 
+ACCURACY = "tolerance", "error"
+"""Settings of the machine-code method `native`, which a run accepts in place of a `method`."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Run:
     """Settings of a run, common to all lanes of a plan; a model may have its own defaults (`run_defaults`)."""
@@ -42,12 +46,18 @@ class Run:
 
         `tolerance` and `error` are those of the machine-code method `native`.
 
-        **Raises:** `ValueError` for settings that do not go together, or not with the model.
+        **Raises:** `ValueError` for unknown settings, and for those that do not go together, or not with the model.
         """
-        chosen = {**model.run_defaults, **{name: value for name, value in given.items() if value is not None}}
-        accuracy = {name: chosen.pop(name) for name in ("tolerance", "error") if name in chosen}
-        if chosen.get("method") is None:
+        known = (*(f.name for f in dataclasses.fields(cls)), *ACCURACY)
+        if unknown := [name for name in given if name not in known]:
+            raise ArgumentError(unknown[0], said=f"must be a setting of a run, one of: {', '.join(known)}.")
+        given = {name: value for name, value in given.items() if value is not None}
+        chosen = {**model.run_defaults, **given}
+        accuracy = {name: chosen.pop(name) for name in ACCURACY if name in chosen}
+        if "method" not in chosen:
             chosen["method"] = native(**accuracy)
+        elif both := accuracy.keys() & given.keys():
+            raise ArgumentError("method", *sorted(both), said="must not be given together.")
         check_call(cls, **chosen)
         run = cls(**chosen)
         run = dataclasses.replace(run, keep=min(run.keep, run.revolutions))

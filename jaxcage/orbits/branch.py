@@ -173,7 +173,9 @@ def _branch(problem: ContinuationProblem, points: Points, places: Sequence[Place
     # If several lie between two points, only the outer ones are next to an orbit of known stability.
     outer = lambda i, k: (stable[k] and k not in before[:i]) or (stable[k + 1] and k not in before[i + 1 :])
     special = [_point(problem, place, bool(outer(i, place.after))) for i, place in enumerate(places)]
-    value = problem.values(points.u)[:, 0]
+    value, ends = problem.values(points.u)[:, 0], np.array([problem.lower[0], problem.upper[0]])
+    for end in ends:  # as given, not as rounded in the unit of the parameter
+        value = np.where(np.abs(value - end) <= 1e-12 * np.abs(ends).max(), end, value)
     speed = value if problem.parameter == SPEED else np.full(value.shape, float(problem.given.speed))
     state, multipliers = problem.states(points.u), problem.multipliers(points)
     name, periods = name_of(problem.parameter), int(problem.equations.problem.periods)

@@ -349,10 +349,31 @@ class Continuation:
         ]
 
     def finished(self) -> list[Path]:
-        """Take all steps and return the curves."""
+        """Take all steps and return the curves, which end on the limits of the range where they leave it."""
         for _ in self:
             pass
+        if left := [c for c in self.curves if c.ended == "range"]:
+            self._cut(left)
         return self.curves
+
+    def _cut(self, left: Sequence[Path]) -> None:
+        """Replace the last points, which are outside the range, by those on its limits, where these are found."""
+        problem, dim = self.problem, self.problem.scale.size
+        before, beyond = (np.stack([c.points[k].u for c in left]) for k in (-2, -1))
+        first, moved = problem.values(before), problem.values(beyond - before)
+        limit = np.where(moved > 0, problem.upper, problem.lower)
+        shares = np.divide(limit - first, moved, out=np.full(moved.shape, np.inf), where=moved != 0)
+        row, which = np.arange(len(left)), np.argmin(shares, axis=1)
+        share, normal = np.maximum(shares[row, which], 0.0), np.zeros(before.shape)
+        at = before + share[:, None] * (beyond - before)
+        at[row, dim + which], normal[row, dim + which] = (limit / problem.units)[row, which], np.sign(moved)[row, which]
+        got = self.corrector(problem, at, normal, np.array([int(c.points[-1].steps) for c in left]), measured=True)
+        near = got.converged & (np.linalg.norm(got.u - at, axis=1) < np.linalg.norm(beyond - before, axis=1))
+        for i, curve in enumerate(left):
+            if share[i] == 0:  # it begins on the limit
+                curve.points.pop()
+            elif near[i]:
+                curve.points[-1] = got.take(i)
 
     def __iter__(self) -> "Continuation":
         return self

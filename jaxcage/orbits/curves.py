@@ -7,6 +7,7 @@ the implicit function theorem, so that the orbit follows a contact that moves wi
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -23,7 +24,7 @@ from ..models import AbstractForcedSystem
 from ..quantities import notebook_html
 from ..solve import AbstractMethod
 from .bifurcation import point_equations
-from .continuation import Continuation, ContinuationProblem, Path, first_points, in_parallel
+from .continuation import Continuation, ContinuationProblem, first_points, in_parallel
 from .gradient import Sensitivity, sensitivity
 from .point import Point, critical_of, require_found
 from .problem import ENOUGH, SPEED, Given, Parameter, counted, make_problem, value_of
@@ -100,9 +101,12 @@ def curve(
         said = f"must be a period-doubling, Neimark-Sacker or fold, but it is a {point.kind}."
         raise ArgumentError("point", said=said)
     require_found(point)
-    if not (lower < upper and x_lower < x_upper):
-        raise ArgumentError("lower", "upper", "x_lower", "x_upper", said="must be in ascending order.")
-    own = float(value_of(system, point.speed, y))
+    if y == x or point.parameter not in (x, "parameter"):  # the latter was picked by a function
+        said = f"must be the parameter of the point, {point.parameter}, and another one, but are {x} and {y}."
+        raise ArgumentError("x", "y", said=said)
+    if not (-math.inf < lower < upper < math.inf and -math.inf < x_lower < x_upper < math.inf):
+        raise ArgumentError("lower", "upper", "x_lower", "x_upper", said="must be in ascending order and finite.")
+    own = float(value_of(system, point.speed, y, "y"))
     if not lower <= own <= upper:
         said = f"must have the system's {y} between them, {own:g}, but are {lower:g} and {upper:g}."
         raise ArgumentError("lower", "upper", said=said)
@@ -113,7 +117,7 @@ def curve(
     if not bool(start.converged[0]):
         said = f"must be a {point.kind} of the system, but Newton's method finds none there."
         raise ArgumentError("point", said=said)
-    up, down = in_parallel(lambda sign: _followed(problem, start.turned(sign), WALK), [1.0, -1.0])
+    up, down = in_parallel(lambda sign: _followed(problem, start.turned(sign), WALK).finished()[0], [1.0, -1.0])
     points = up.row.after(down.row)
     multipliers, values = problem.multipliers(points), problem.values(points.u)
     genuine = np.array([point.kind != "Neimark-Sacker" or _is_on_circle(mu) for mu in multipliers])
@@ -149,8 +153,8 @@ def _point_curve(
     return problem, first_points(problem, u[None], np.eye(1, u.size, u.size - 1), least)
 
 
-def _followed(problem: ContinuationProblem, start: Points, steps: StepControl) -> Path:
-    """Follow a curve of bifurcation points in the direction of its first tangent."""
+def _followed(problem: ContinuationProblem, start: Points, steps: StepControl) -> Continuation:
+    """Follow a curve of bifurcation points in the direction of its first tangent, up to the first point outside."""
     walk = Continuation(problem, start, steps, oriented=False)
     for advanced in walk:
         for one in advanced:  # borders from the null vectors at the last point keep the equations far from singular
@@ -158,7 +162,7 @@ def _followed(problem: ContinuationProblem, start: Points, steps: StepControl) -
             borders = tuple(v / np.linalg.norm(v) for v in (known.left, known.right))
             equations = eqx.tree_at(lambda e: (e.left, e.right), walk.problem.equations, borders)
             walk.problem = dataclasses.replace(walk.problem, equations=equations)
-    return walk.curves[0]
+    return walk
 
 
 def _is_on_circle(multipliers: np.ndarray) -> bool:
@@ -229,7 +233,7 @@ def follow(
     ahead = float(start.tangent[0, -1])
     first = min(LONGEST, length / max(abs(ahead), 1e-3))
     control = StepControl(first=first, longest=max(LONGEST, first), shortest=min(SHORTEST, first), most=MOST)
-    path = _followed(problem, start.turned(np.sign(ahead)), control)
+    (path,) = _followed(problem, start.turned(np.sign(ahead)), control).curves
     row = path.row
     share = row.u[:, -1] / length
     if share[-1] >= 1:

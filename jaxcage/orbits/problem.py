@@ -52,8 +52,8 @@ def without_turns(way: Any, turns: Any) -> Any:
     return way - turns * (way / turns).round()
 
 
-def value_of(system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> Array:
-    return jnp.asarray(speed if parameter == SPEED else pick(system, parameter)(system), dtype=float)
+def value_of(system: AbstractForcedSystem, speed: Any, parameter: Parameter, name: str = "parameter") -> Array:
+    return jnp.asarray(speed if parameter == SPEED else pick(system, parameter, name)(system), dtype=float)
 
 
 def name_of(parameter: Parameter) -> str:

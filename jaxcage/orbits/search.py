@@ -160,7 +160,7 @@ class SynchronousOrbits:
 def _crossings(branch: Branch, speed: float) -> list[tuple[bool, np.ndarray, np.ndarray]]:
     """Interpolate stability, state and multipliers linearly where a branch passes `speed`."""
     v, found = branch.value, []
-    for k in np.flatnonzero(((v[:-1] - speed) * (v[1:] - speed) < 0) | (v[:-1] == speed)):
+    for k in np.flatnonzero((v[:-1] - speed) * (v[1:] - speed) <= 0):
         share = 0.0 if v[k + 1] == v[k] else (speed - v[k]) / (v[k + 1] - v[k])
         state = branch.state[k] + share * (branch.state[k + 1] - branch.state[k])
         near = k + int(round(share))
