@@ -51,7 +51,7 @@ class DesignSpace(eqx.Module):
         known = parameter_paths(system)
         for name, (low, high) in vary.items():
             if name not in known:
-                raise InputError(f"`{name}` must be a parameter of the design: {', '.join(known)}.")
+                raise InputError(f"`{name}` must be a parameter of the design: {', '.join(known) or 'there is none'}.")
             if not (np.isfinite([low, high]).all() and low < high):
                 raise InputError(f"Bounds of `{name}` must ascend, but {low} and {high} were given.")
         low, high = np.array(list(vary.values()), dtype=float).T
