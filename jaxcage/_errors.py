@@ -1,6 +1,8 @@
 """Exceptions whose messages are complete sentences, shown as they are by scripts and by the command."""
 
-from collections.abc import Callable
+import difflib
+import re
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -48,6 +50,21 @@ def shown(value: Any) -> str:
         kind = "a masked array" if isinstance(value, np.ma.MaskedArray) else "an array"
         return f"{kind} of shape {np.shape(value)} and kind {kind_of}"
     return f"something of kind {type(value).__name__}"
+
+
+def parameters_like(given: str, names: Sequence[str]) -> str:
+    """What to choose in place of an unknown parameter: those alike, or all where there are few or none is alike."""
+    if not names:
+        return "a parameter, of which there are none"
+    close = lambda name: given in name or difflib.get_close_matches(given[:100], re.split("[._]", name), 1, 0.7)
+    like = [name for name in names if close(name)] or difflib.get_close_matches(given[:100], names)
+    if len(names) > FEW and 0 < len(like) <= FEW:
+        return f"a parameter (did you mean {' or '.join(like)}?)"
+    return f"one of {', '.join(names)}"
+
+
+FEW = 12
+"""Number of names that a message lists."""
 
 
 class Stop(KeyboardInterrupt):

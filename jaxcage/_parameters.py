@@ -28,7 +28,7 @@ from ._allowed import (
     must_be_given as must_be_given,
     within as within,
 )
-from ._errors import ArgumentError, InputError
+from ._errors import ArgumentError, InputError, parameters_like
 
 
 M = TypeVar("M", bound=eqx.Module)
@@ -290,8 +290,8 @@ def replace(module: M, **values: PyTree) -> M:
         if name in parts:
             continue
         if name not in paths:
-            known = ", ".join([*paths, *sorted(parts)])
-            raise ArgumentError(name, said=f"must name a part of the model, one of: {known}.")
+            known = parameters_like(name, [*paths, *sorted(parts)])
+            raise ArgumentError(name, said=f"must name a part of the model: {known}.")
         metadata = fields[paths[name]].metadata
         if (offered := metadata.get("choice")) and value not in offered:
             raise ArgumentError(name, said=f"must be one of {', '.join(offered)}, but {value!r} was given.")
@@ -347,8 +347,8 @@ def pick(model: Any, parameter: Parameter, name: str = "parameter") -> Callable[
         return parameter
     paths = parameter_paths(model) or _by_field_name(model)
     if parameter not in paths:
-        known = ", ".join(["speed", *paths])
-        raise ArgumentError(name, said=f"must be one of {known}, but '{parameter}' was given.")
+        known = parameters_like(parameter, ["speed", *paths])
+        raise ArgumentError(name, said=f"must be {known}, but '{parameter}' was given.")
     path = paths[parameter]
     return lambda m: get(m, path)
 

@@ -366,7 +366,7 @@ def test_a_fold_that_comes_into_an_open_range():
 
 REFUSED = [
     (dict(operating=(2.0, 1.2)), "`operating` must be two positive speeds, ascending, but are 2 and 1.2"),
-    (dict(vary={"z": (0.0, 1.0)}), "`z` must be a parameter of the design: x, y, d, k, s, r"),
+    (dict(vary={"z": (0.0, 1.0)}), "`z` must be one of x, y, d, k, s, r"),
     (dict(vary={"x": (1.0, 1.0)}), "Bounds of `x` must ascend, but 1.0 and 1.0 were given"),
     (dict(search="newton"), "`search` must be one of slsqp, augmented, but 'newton' was given"),
     (dict(objective="noise"), "`objective` must be one of cost, width, but 'noise' was given"),

@@ -50,7 +50,7 @@ REFUSED = [
     ("statics 1a --load heavy", '"heavy"'),
     ("statics 1a --speed 6e4 --load 1e-10", "--load and --speed"),
     ("runup 1a --rate 1e6", "--rate"),
-    ("map 1a --y gap", "--y must be one of"),
+    ("map 1a --y gap", "--y must be a parameter (did you mean guidance_gap?), but 'gap' was given"),
     ("map 1a --lower 0.4kg", "--lower"),
     ("map 1a --lower 0.5mm", "guidance_gap = 0.00045 m between them"),
     ("map 1a --points 300", "--points must be ACROSSxUPWARDS"),

@@ -8,7 +8,7 @@ import numpy as np
 
 import jaxcage as jc
 
-from .._errors import ArgumentError, InputError, NoResult
+from .._errors import ArgumentError, InputError, NoResult, parameters_like
 from . import options as o
 from .answer import Answer
 from .progress import report
@@ -258,7 +258,7 @@ def map_(
     """
     model, y = subject.model, y or subject.usual("guidance_gap", "load")
     if y not in (info := jc.parameter_info(model)):
-        raise InputError(f"Option --y must be one of {', '.join(info)}, but '{y}' was given.")
+        raise InputError(f"Option --y must be {parameters_like(y, [*info])}, but '{y}' was given.")
     given: dict[str, Any] = {}
     for end, text in (("lower", lower), ("upper", upper)):
         try:

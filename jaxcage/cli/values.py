@@ -10,7 +10,7 @@ import numpy as np
 
 import jaxcage as jc
 
-from .._errors import ArgumentError, InputError
+from .._errors import ArgumentError, InputError, parameters_like
 from .options import MOST, read_quantity
 from .subject import Subject
 
@@ -45,7 +45,7 @@ def read_bounds(given: Sequence[str], subject: Subject) -> dict[str, tuple[float
 
     def read(name: str, text: str) -> Any:
         if name not in names:
-            raise InputError(f"Option --vary must name one of {', '.join(names)}, but names '{name}'.")
+            raise InputError(f"Option --vary must name {parameters_like(name, names)}, but names '{name}'.")
         between = _read(name, text, subject)
         if not isinstance(between, jc.files.Range) or between.is_normal:
             raise ValueError(f"must be a parameter's NAME=LOWER:UPPER, but is {text}.")
@@ -127,7 +127,7 @@ def _read_each(option: str, given: Sequence[str], form: str, read: Callable[[str
 def _read(name: str, text: str, subject: Subject) -> Any:
     info, parts, tolerance = jc.parameter_info(subject.model), text.split(":"), text.split("±", 1)
     if name not in (names := [SPEED, OIL, *info]):
-        raise InputError(f"Option --vary must name one of {', '.join(names)}, but names '{name}'.")
+        raise InputError(f"Option --vary must name {parameters_like(name, names)}, but names '{name}'.")
 
     def number(part: str) -> float:
         if name == SPEED:

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._errors import ArgumentError, InputError
+from .._errors import ArgumentError, InputError, parameters_like
 from .._parameters import parameter_paths, parameters, replace
 from .._pytrees import compiled
 from ..models import AbstractForcedSystem
@@ -51,7 +51,7 @@ class DesignSpace(eqx.Module):
         known = parameter_paths(system)
         for name, (low, high) in vary.items():
             if name not in known:
-                raise InputError(f"`{name}` must be a parameter of the design: {', '.join(known) or 'there is none'}.")
+                raise InputError(f"`{name}` must be {parameters_like(name, [*known])}.")
             if not (np.isfinite([low, high]).all() and low < high):
                 raise InputError(f"Bounds of `{name}` must ascend, but {low} and {high} were given.")
         low, high = np.array(list(vary.values()), dtype=float).T
