@@ -77,6 +77,7 @@ REFUSED = [
     ("report 1a --operating fast", "--operating must be a range of speed"),
     ("check 1a --operating 8500", "--operating must be two speeds"),
     ("check 1a --operating 8500-90000", "62516 rpm"),
+    ("check 1a --operating 900-4,2e3", "without commas"),
     ("gradient 1a --speed 1e4", "--speed goes with a bearing"),
     # Whole bearings.
     ("bifurcations nu2310", "takes a cage"),

@@ -204,7 +204,8 @@ def test_kind_chooses_the_law():
     ({"base": "1a", "model": "bearing"}, "`base` must be one of nu2310"),
     ({"model": "bearing"}, "must be given, unless"),
     ({"base": "nu2310", "traction": {"peak": 0.01}}, "`peak` must be above `rest` and `limit`"),
-    ({"base": "nu2310", "guidance": "inner", "inner_land_diameter": "45 mm"}, "above the bore, 50 mm"),
+    ({"base": "nu2310", "guidance": "inner", "inner_land_diameter": "60 mm"}, "pitch circle, 65 and 81 mm, but is 60"),
+    ({"base": "nu2310", "guidance": "inner", "inner_land_diameter": "85 mm"}, "pitch circle, 65 and 81 mm, but is 85"),
 ])  # fmt: skip
 def test_refused(table: dict, said: str):
     with pytest.raises(ConfigError, match=said):

@@ -9,7 +9,10 @@ from helpers import WELL, DoubleWell, double_well
 from literature import DUFFING_FOLDS
 
 import jaxcage as jc
+from jaxcage.design import Design, DesignSpace, OperatingRange, Requirements, Tolerance, Value
 from jaxcage.design.operating import Through
+from jaxcage.design.optimiser import Problem
+from jaxcage.design.requirements import listed
 
 
 VARY = {"damping": (0.1, 1.0), "cubic": (0.5, 3.0)}
@@ -111,6 +114,40 @@ def test_sobol_indices_and_their_intervals_of_a_value_far_from_zero():
     assert shifted.first == pytest.approx(plain.first)
     for name, ends in plain.first_interval.items():
         assert shifted.first_interval[name] == pytest.approx(ends)
+
+
+def bare(kind, **fields):
+    """An object with only some of its fields."""
+    found = object.__new__(kind)
+    vars(found).update(fields)
+    return found
+
+
+def test_what_no_design_keeps_is_told_in_the_units_of_its_table():
+    """The worst bearing within tolerances counts, which the table shows even if no design is feasible."""
+    limits = listed(Requirements(film=50e-6, decay=5.0), jc.case("1a"))
+    worst = {limits[3].name: Value(np.exp(-1 / 6), np.zeros(1)), "least film": Value(2e-5, np.zeros(1))}
+    after = {"film": Value(6e-5, np.zeros(1))}
+    found = bare(Design, requirements=limits, short=dict.fromkeys(worst, 1.0), worst=worst, before={}, after=after)
+    told = "decay of a disturbance, 6 rev. (at most 5); least film, 0.02000 mm (at least 0.05000)"
+    assert jc.show.broken_words(found) == told
+    shown = jc.show.requirement_table("", found)
+    assert shown.heads[3:6] == ["before", "after", "worst in tolerance"]
+    assert shown.rows[-1][3:6] == ("-", "0.06000", "0.02000")
+
+
+def test_a_tolerance_beyond_what_a_parameter_may_be():
+    """A gap of 0.45 mm with 0.5 mm more or less."""
+    space = DesignSpace.of(jc.case("1a"), {"guidance_gap": (0.3e-3, 0.6e-3)})
+    problem = Problem(bare(OperatingRange, space=space), [], None, np.array([True]), {})
+    made = lambda half: problem.worst(space.place, {}, {"guidance_gap": Tolerance(-half, half)})
+    assert made(0.1e-3) == {}
+    assert made(0.5e-3) == "guidance_gap must be a number from 1e-05 to 0.005 m, but reaches -5e-05"
+
+
+def test_a_share_of_a_temperature_is_that_of_the_absolute_one():
+    assert jc.show.direction_words("temperature") == "absolute temperature"
+    assert jc.show.direction_words("cage_mass+cage_inertia") == "cage mass, cage inertia"
 
 
 def test_tolerance_budget_is_the_root_of_squares():

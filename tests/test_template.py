@@ -12,6 +12,7 @@ from helpers import declared, elastic, roller_pass
 import jaxcage as jc
 from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.files import configuration, load_model, model_from, read_bearing, save_model, template
+from jaxcage.files.description import describe
 
 
 jc.enable_x64()  # read while the tests are collected
@@ -116,6 +117,10 @@ def test_rolling_resistance_follows_the_series_and_hardness_the_material(name, m
     own = {"drag": table["drag"] | {"rolling_coefficient": 2e-6}, "wear": {"hardness": "1 GPa"}, "base": "nu2310"}
     found = model_from({"base": "nu2310", "material": material} | own)
     assert (found.drag.rolling_coefficient, found.wear.hardness) == (2e-6, 1e9)
+    full = tomllib.loads(template("bearing"))
+    assert "drag.rolling_coefficient" not in describe(full).estimated
+    del full["drag"]["rolling_coefficient"]  # dimensions tell no series
+    assert "drag.rolling_coefficient" in describe(full).estimated
 
 
 def test_what_a_file_changes_of_a_ready_made_bearing(tmp_path: Path):

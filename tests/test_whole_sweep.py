@@ -125,6 +125,14 @@ def test_slow_shafts_run_through():
 
 
 @pytest.mark.wide
+def test_a_light_cage_in_cold_oil_runs_through():
+    """45 g in 150 mm^2/s: at its land, where the second state begins, the film stops it in a millionth of a turn."""
+    light = bearing(cage_mass=0.045, cage_inertia=8e-5, guidance_gap=0.35e-3, viscosity_1=150e-6)
+    found = jc.sweep(light, jc.rpm(1500.0), initial_states=2, discard=0, revolutions=1, blocks=1)
+    assert (found["outcome"] == "successful").all()
+
+
+@pytest.mark.wide
 def test_exponents_of_the_last_revolutions():
     """Followed over four of 16, all else over all; means are those of a run that follows them from the beginning."""
     options = dict(discard=0, revolutions=16, blocks=16, method=jc.native(1e-4, 1e-2))

@@ -130,7 +130,7 @@ def _calm_design(
     keep = jc.Requirements(calm.margin, calm.decay, film, calm.land_force, calm.grade, calm.drag)
     tolerance = read_tolerances(calm.tolerance or "", subject, high)
     graded = {n for n, each in tolerance.items() if each.absolute} if usual else set()
-    bounds = {n: ends for n, ends in bounds.items() if n not in graded}
+    bounds, notes = {n: ends for n, ends in bounds.items() if n not in graded}, [] if graded else notes
     given: dict[str, Any] = {"objective": calm.objective, "tolerance": tolerance}
     best = jc.design_for(model, (low, high), bounds, keep, **given, **searches, progress=report)
     tables = [jc.show.changed_table(f"Design of {name}", model, best, bounds)]
@@ -160,9 +160,9 @@ def _calm_sentence(best: Any, over: str, objective: str) -> str:
     if best.lost:
         return f"The values of no design within the bounds are known over {over}: {best.lost}."
     if not best.feasible:
-        short = ", ".join(f"{name} by {value:.3g}" for name, value in best.short.items())
         against = f" In conflict: {' and '.join(best.conflict)}." if best.conflict else ""
-        return f"No design within the bounds keeps all requirements over {over}: short are {short}.{against}"
+        missed = jc.show.broken_words(best)
+        return f"No design within the bounds keeps all requirements over {over}; missed are {missed}.{against}"
     if objective == "width":
         return f"Over {over} {best.cost:.0f} rpm are unstable, {best.cost_before:.0f} before."
     said = VERDICTS[best.verdict].format(range=over)
@@ -257,7 +257,7 @@ def identify(
     """
     model, unknowns = subject.model, subject.unknowns
     rows = jc.files.read_measurements(measured, subject.speeds, 1 / (subject.shaft or 1.0))
-    told = {"method": steps.method, "progress": partial(report, "draws")}
+    told = {"method": steps.method, "progress": partial(report, "simulations")}
     missed = lambda place: jc.design.misses(model, unknowns, rows, place, **told)
     found = jc.design.narrow(unknowns, missed, draws=draws)
     table, info = jc.show.measured_table(found, rows, subject.beside), jc.parameter_info(model)

@@ -82,7 +82,7 @@ def read_range(given: str) -> tuple[float, ...]:
     try:
         part, whose = split_owner(given)
         ends = TO.split(part, maxsplit=1)
-        units = [end.lstrip("0123456789.e ") for end in ends]
+        units = [end.lstrip("0123456789.,e ") for end in ends]
         other = next(filter(None, units), "rpm")
         found = [to_si(end if unit else f"{end} {other}", "rpm") for end, unit in zip(ends, units, strict=True)]
     except ValueError as error:

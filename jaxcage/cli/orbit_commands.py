@@ -220,7 +220,8 @@ def _of_means(
     title, each = f"{subject.name}, {subject.at(at)}", found.statistics.items()
     by = [(abs(x), n, d, x) for n, g in each for d, x in zip(g.directions, g.elasticity) if np.isfinite(x)]
     _, name, direction, most = max(by, default=(0.0, "nothing", "any parameter", 0.0))
-    said = f"1 % more {direction.replace('_', ' ')} changes {name} by {most:+.2f} %, the largest of all elasticities."
+    more = f"1 % more {jc.show.direction_words(direction)}"
+    said = f"{more} changes {name} by {most:+.2f} %, the largest of all elasticities."
     notes = [f"{found.pairs} pairs of designs; failed: {found.failed} designs; inaccurate: {found.inaccurate} lanes"]
     if drifting := [n for n, g in each if not g.settled]:
         notes.append(f"Not settled, so that more --discard may change it: {', '.join(drifting)}")

@@ -106,7 +106,7 @@ def sweep(
 def chances(subject: Subject, speeds: Any, draws: int, run: o.RunOptions = o.RunOptions()) -> Answer:
     """Answer on the probability that a cage with unknown values is calm at all speeds [rad/s], and on what would decide
     it; the first of its tables is the one by speed."""
-    d, told = jc.design, {"draws": draws, "progress": partial(report_lanes, "draws")}
+    d, told = jc.design, {"draws": draws, "progress": partial(report_lanes, "simulations")}
     found = d.ensemble(subject.model, subject.unknowns, speeds, **told, **run.settings)
     if found.failed.all():
         raise NoResult(f"All {found.failed.size} simulations failed: try more steps (--steps), or narrower ranges.")

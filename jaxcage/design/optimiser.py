@@ -17,8 +17,10 @@ import optax
 from jaxtyping import Float
 from scipy.optimize import minimize, nnls
 
+from .._allowed import allowed
 from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
+from .._parameters import parameter_info
 from ..lanes import sobol
 from ..models import AbstractForcedSystem
 from .design_space import DesignSpace, Value, function_value
@@ -195,7 +197,11 @@ class Problem:
 
     def worst(self, place: np.ndarray, values: Any, tolerance: Mapping[str, Tolerance]) -> dict[str, Value] | str:
         """Value of each requirement for the worst bearing within tolerances; or why it is not known."""
-        found = {}
+        found, info = {}, parameter_info(self.space.system) if tolerance else {}
+        for name, each in tolerance.items():
+            for end in each.ends(self.space.values(place)[name]):
+                if not info[name].lower <= end <= info[name].upper:
+                    return f"{name} {allowed(info[name])}, but reaches {end:.3g}"
         for r in self.wanted:
             there, (_, slope) = place.copy(), r.slack(values[r.of])
             for i, (name, value) in enumerate(self.space.values(place).items()):

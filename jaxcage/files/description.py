@@ -170,8 +170,11 @@ def describe(table: Mapping[str, Any]) -> Description:
     if bearing is not None:
         names = bearing.values if bearing.ready_made is None else estimated(bearing.ready_made[1])
         guessed = tuple(f"bearing.{name}" for name in names if name not in rest["bearing"])
-        if bearing.ready_made and (drag := root.parts.get("drag")):
-            drag.values.setdefault("rolling_coefficient", rolling_coefficient(bearing.ready_made[1]))
+        drag = root.parts["drag"].values if "drag" in root.parts else {}
+        if bearing.ready_made:
+            drag.setdefault("rolling_coefficient", rolling_coefficient(bearing.ready_made[1]))
+        elif base is None and "rolling_coefficient" not in drag and drag.get("rolling_law", "none") != "none":
+            guessed += ("drag.rolling_coefficient",)
     told = {*rest, *(f"lubricant.{name}" for name in rest.get("lubricant", ()))}
     guessed += tuple(name for name in ("load", "lubricant.temperature") if base is None and name not in told)
     own = {**rest, **rest.get("pockets", {}), **rest.get("wear", {})}

@@ -66,7 +66,8 @@ def _checks(n: Mapping[str, Any]) -> Iterator[tuple[bool, str, str]]:
     yield gap >= rib, "guidance_gap", f"leave room for the cage, but is {gap:g} mm in a rib of {rib:g} mm"
     if n.get("guidance") == "inner":
         land = mm("inner_land_diameter")
-        yield land <= bore, "inner_land_diameter", f"be above the bore, {bore:g} mm, but is {land:g} mm"
+        must = f"lie between the inner raceway and the pitch circle, {inner:g} and {pitch:g} mm, but is {land:g} mm"
+        yield land < inner or land >= pitch, "inner_land_diameter", must
         must = f"leave room for the cage within the outer ring's ribs, {rib:g} mm, but are {land:g} and {gap:g} mm"
         yield land + gap >= rib, "inner_land_diameter` and `guidance_gap", must
     mass, volume = number("cage_mass"), 1e-9 * math.pi / 4 * (outside**2 - bore**2) * width

@@ -49,7 +49,7 @@ SLOWEST_CAGE = 0.01
 takes for ever."""
 SPACING = TURN / 16
 PERIODS, COMPARED, SLOWEST = 50, 10, 1000.0
-"""Constants of `BearingModel.comparable` and `BearingModel.slowness`."""
+"""Constants of `BearingModel.comparable` and `BearingModel.periods`."""
 
 
 class InnerRing(eqx.Module):
@@ -225,6 +225,15 @@ class BearingModel(AbstractForcedSystem):
         return jnp.hypot(*self.centre(y))
 
     def slowness(self, speed: Scalar) -> Array:
+        """The larger of `periods` and of what the film needs at the land, where explicit steps are as short as the time
+        in which it stops a light cage in thick oil, 1 to `SLOWEST`."""
+        c, e, film = self.clearance, self.contact.onset, self.film
+        size = film.n_lands * self.lubricant.dynamic_viscosity * self.land_radius * (film.land_width / c) ** 3
+        rate = size * jnp.pi / 2 * (1 + 2 * e**2) / (1 - e**2) ** 2.5 / self.cage_mass
+        stiff = rate * SPACING / jnp.abs(self.rolling_cage_speed(speed)) / self.steps.most
+        return jnp.clip(jnp.maximum(self.periods(speed), stiff), 1.0, SLOWEST)
+
+    def periods(self, speed: Scalar) -> Array:
         """Number of a loaded roller's periods in a sixteenth of a revolution over `PERIODS`, 1 to `SLOWEST`."""
         scale = state_scale(self, speed)
         turned = PERIODS * TURN * scale.rollers[2, 0] / scale.rollers[3, 0] * jnp.abs(self.rolling_cage_speed(speed))
@@ -237,7 +246,7 @@ class BearingModel(AbstractForcedSystem):
         vibration on its raceway (NU2310 below 4000 rpm), 10 such periods: neighbouring motions diverge over time, not
         over revolutions.
         """
-        slow = float(_slowness(self, jnp.asarray(speed)))
+        slow = float(_periods(self, jnp.asarray(speed)))
         return COMPARED / PERIODS * SPACING / slow if slow > 1 else SPACING
 
     def first_state(self, start: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -299,8 +308,8 @@ class BearingModel(AbstractForcedSystem):
 
 
 @compiled
-def _slowness(model: BearingModel, speed: Scalar) -> Array:
-    return model.slowness(speed)
+def _periods(model: BearingModel, speed: Scalar) -> Array:
+    return model.periods(speed)
 
 
 @compiled

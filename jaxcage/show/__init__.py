@@ -44,6 +44,7 @@ from .design_figures import (
 )
 from .design_tables import (
     before_and_after_table as before_and_after_table,
+    broken_words as broken_words,
     budget_of_tolerances_table as budget_of_tolerances_table,
     budget_table as budget_table,
     changed_table as changed_table,
@@ -98,6 +99,7 @@ from .run_figures import (
 )
 from .slope_tables import (
     FIRST as FIRST,
+    direction_words as direction_words,
     edge_slopes as edge_slopes,
     elasticities_table as elasticities_table,
     gradient_table as gradient_table,

@@ -7,7 +7,7 @@ from typing import Any
 from .._parameters import parameter_info, parameters
 from ..design import BeforeAfter, Design, Optimum, Requirement, SobolIndices, ToleranceBudget, Value
 from .quantity_tables import head_of
-from .tables import OWN, UNIT, Beside, Column, Table, speed_columns, table
+from .tables import OWN, SHOWN, UNIT, Beside, Column, Table, speed_columns, table
 
 
 MOST = 8
@@ -38,13 +38,28 @@ def requirement_table(title: str, found: Design, beside: Beside = None) -> Table
         if r.of == "peak" and after is not None and after.value == 0:
             continue
         values = {"before": found.before.get(r.of), "after": after, "worst": found.worst.get(r.name)}
-        row: dict[str, Any] = {"requirement": r.name, "unit": "rev." if r.of == "multiplier" else r.unit}
-        row["limit"] = f"{'at least' if r.sign > 0 else 'at most'} {_text(r, r.limit)}"
+        row: dict[str, Any] = {"requirement": r.name, "unit": _unit(r), "limit": _limit(r)}
         row |= {name: None if each is None else _reached(r, each) for name, each in values.items()}
         rows.append(row | {"rpm": None if after is None else after.rpm})
     columns = ["requirement", UNIT, "limit", "before", "after"]
-    columns += [Column("worst in tolerance", "worst")] if found.budget else []
+    tolerated = any(found.worst.get(r.name) is not found.after.get(r.of) for r in found.requirements)
+    columns += [Column("worst in tolerance", "worst")] if tolerated else []
     return table(title, rows, [*columns, *speed_columns("at [rpm]", "rpm", beside)], "requirements")
+
+
+def broken_words(found: Design) -> str:
+    """Requirements that are not kept, their values and limits: `least film, 0.02000 mm (at least 0.05000)`."""
+    rows = [(r, _text(r, found.worst[r.name].value)) for r in found.requirements if r.name in found.short]
+    unit = lambda r: SHOWN.get(_unit(r), _unit(r))
+    return "; ".join(f"{r.name}, {value} {unit(r)}".rstrip() + f" ({_limit(r)})" for r, value in rows)
+
+
+def _unit(r: Requirement) -> str:
+    return "rev." if r.of == "multiplier" else r.unit
+
+
+def _limit(r: Requirement) -> str:
+    return f"{'at least' if r.sign > 0 else 'at most'} {_text(r, r.limit)}"
 
 
 def _text(r: Requirement, value: float) -> str:

@@ -133,6 +133,11 @@ def width_table(title: str, edges: Mapping[str, SolvedEdge], names: Sequence[str
     return table(f"{title}, and what 1 % more of a parameter adds [rpm]", rows, columns, "widths")
 
 
+def direction_words(name: str) -> str:
+    """Parameters that change by the same share, in words; a share of a temperature counts from absolute zero."""
+    return name.replace("_", " ").replace("+", ", ").replace("temperature", "absolute temperature")
+
+
 def mean_gradient_tables(title: str, found: MeanGradient) -> list[Table]:
     """Tables of the elasticities of means with their errors, the largest first, and of the means."""
     rows, moved = [], []
@@ -146,7 +151,7 @@ def mean_gradient_tables(title: str, found: MeanGradient) -> list[Table]:
                 by[direction] |= dict(zip(("slope", "slope_error"), found.slope(name, direction), strict=True))
         rows.append({"name": name, **chosen(each, "unit value value_error drift drift_error settled"), "by": by})
         order = sorted(by, key=lambda n: -abs(by[n]["elasticity"])) if each.value else []
-        moved += [{"statistic": name, "by": n.replace("_", " ").replace("+", ", ")} | by[n] for n in order]
+        moved += [{"statistic": name, "by": direction_words(n)} | by[n] for n in order]
     elasticities = ["statistic", "by", Column("elasticity", error="error")]
     means = [Column("statistic", "name"), Column("mean", "value", error="value_error"), Column("SI unit", "unit")]
     means.append(Column("settled"))
