@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from helpers import document
 from report_example import orbits, swept
 
@@ -144,3 +145,14 @@ def test_narrow_ranges_do_not_count_where_an_orbit_is_said_to_be_stable():
     found = dataclasses.replace(found, stretches=(low, *parts), sweep=sweep)
     said = of_orbits(Subject("1a", jc.case("1a")), found, jc.unstable_ranges(found)).sentence
     assert "except 7000 to 12000 rpm, from 20000 rpm on (ranges narrower than 500 rpm do not count)." in said
+
+
+def test_the_motion_of_a_whole_bearing_counts_what_is_undecided_and_why_others_failed():
+    names = np.array([["locally_periodic", "failed"], ["undecided", "disordered"]])
+    ended = np.array([["successful", "max_steps_reached"], ["inaccurate", "successful"]])
+    data = {"label": (("speed", "initial_state"), names), "outcome": (("speed", "initial_state"), ended)}
+    said = jc.show.motion_sentence("the range", xr.Dataset(data, coords={"rpm": ("speed", [1e3, 2e3])}))
+    assert said == (
+        "The cage rattles in part, at 2000 rpm: over the range the cage is calm in 1, rattling in 1, "
+        "undecided in 1 of 4 simulations; 1 failed (max steps reached)."
+    )

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from .._parameters import parameter_info
-from ..analysis import ONE_ROLLER
+from ..analysis import ONE_ROLLER, outcomes
 from ..bearing import listed_like, static_load_rating
 from ..design import Chance, Checked, Index, Margins
 from .tables import OWN, UNIT, Beside, Column, Table, speed_columns, table
@@ -164,9 +164,11 @@ def motion_sentence(over: str, found: xr.Dataset) -> str:
     verdict = cage_verdict(found)
     words = {"calm": "Calm", "circling": "Calm or circling", "not decided": "Not decided"}
     said = words.get(verdict, f"The cage {verdict}")
-    where = f", from {rpm[rough].min():.0f} to {rpm[rough].max():.0f} rpm" if rough.any() and not rough.all() else ""
+    ends = dict.fromkeys(f"{end:.0f}" for end in rpm[rough][[0, -1]]) if rough.any() else {}
+    where = f", {'from' if len(ends) > 1 else 'at'} {' to '.join(ends)} rpm" if ends and not rough.all() else ""
     failed = int(np.sum(label == "failed"))
-    lost = f"; {failed} failed" if failed else ""
+    why = ", ".join(name.replace("_", " ") for name in outcomes(found) if name != "inaccurate")
+    lost = f"; {failed} failed ({why})" if failed else ""
     return f"{said}{where}: over {over} the cage is {shares} of {label.size} simulations{lost}."
 
 
