@@ -259,7 +259,7 @@ def map_(
     """
     model, y = subject.model, y or subject.usual("guidance_gap", "load")
     if y not in (info := jc.parameter_info(model)):
-        raise InputError(f"Option --y must be {parameters_like(y, [*info])}, but '{y}' was given.")
+        raise InputError(f"Option --y must be {parameters_like(str(y), [*info])}, but '{y}' was given.")
     given: dict[str, Any] = {}
     for end, text in (("lower", lower), ("upper", upper)):
         try:
