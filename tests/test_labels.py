@@ -290,8 +290,8 @@ def test_the_exponent_of_a_stretch_has_the_error_of_its_speeds():
 
 @pytest.mark.parametrize("revolutions", [20, 200])
 def test_a_motion_near_a_limit_is_undecided(revolutions: int):
-    """Scatter about a fixed place, with a mean distance of positions one revolution apart of sigma sqrt(pi): a limit
-    within two standard errors of the mean is kept from nine of ten records that lie on it, and none far from it."""
+    """The cage scatters about a fixed place, where the mean distance of positions one revolution apart is sigma times
+    sqrt(pi). On the limit nine of ten records are undecided; at 1.04 times the limit 200 revolutions decide."""
 
     def labels(mean: float) -> list[str]:
         rng, records = np.random.default_rng(5), range(100)
