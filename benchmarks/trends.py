@@ -140,7 +140,8 @@ def trends(revolutions: int, steps: int, few: bool) -> list[Trend]:
     }
     for (what, name, way, source), (shown, offset, unit) in asked.items():
         values = shown[:: len(shown) - 1] if few else shown
-        found = series(name, [offset + unit * value for value in values], revolutions)
+        longer = revolutions * (2 if name == "oil_share" else 1)
+        found = series(name, [offset + unit * value for value in values], longer)
         row = ", ".join(f"{v:g}: {100 * s:.3g} ± {100 * e:.1g} %" for v, (s, e) in zip(values, found, strict=True))
         rows.append(Trend(f"slip over {what}", way, source, row, verdict(1 if way == "rises" else -1, found)))
     return rows
@@ -150,7 +151,8 @@ def page(rows: Sequence[Trend], revolutions: int) -> str:
     """The page in Markdown."""
     about = (__doc__ or "").split("\n\n", 1)[1].strip()
     usual = f"The shaft turns at {SPEED:g} rpm under {LIGHT:g} N unless a row says otherwise"
-    text = f"# Trends of slip\n\n{about}\n\n{usual}; runs have {revolutions} revolutions.\n\n"
+    length = f"runs have {revolutions} revolutions, over the share of oil twice as many"
+    text = f"# Trends of slip\n\n{about}\n\n{usual}; {length}.\n\n"
     table = markdown(["trend", "expected", "source", "found", "verdict"], rows).replace("---:", "---")
     return f"{text}{table}\n\n{made_with()}\n"
 
