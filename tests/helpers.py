@@ -123,7 +123,7 @@ class DoubleWell(eqx.Module):
 
     mass: float = parameter("kg", 0.0, 1e3, "m")
     damping: float = parameter("N s/m", 0.0, 1e3, "d")
-    stiffness: float = parameter("N/m", 0.0, 1e3, "k")
+    stiffness: float = parameter("N/m", -1e3, 1e3, "k")
     cubic: float = parameter("N/m^3", 0.0, 1e3, "b")
     forcing: float = parameter("N", 0.0, 1e3, "g")
 
