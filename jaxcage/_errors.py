@@ -53,7 +53,8 @@ def shown(value: Any) -> str:
 
 
 def parameters_like(given: str, names: Sequence[str]) -> str:
-    """What to choose in place of an unknown parameter: those alike, or all where there are few or none is alike."""
+    """Say which parameters to choose instead of an unknown one: those with a similar name, or all of them if they are
+    few or none is similar."""
     if not names:
         return "a parameter, of which there are none"
     close = lambda name: given in name or difflib.get_close_matches(given[:100], re.split("[._]", name), 1, 0.7)

@@ -214,9 +214,9 @@ def motion_label(place: Float[np.ndarray, "n 2"], samples: int) -> str:
 
 
 def _below(limit: float, x: Float[np.ndarray, " n"], statistic: Callable[..., Any], samples: int) -> bool | None:
-    """Whether a statistic of a record is below a limit, or None if it is within two standard errors of it.
+    """Return True if a statistic of a record is below a limit, and None if it is within two standard errors of it.
 
-    The error is the jackknife's: from the statistic without one after the other of the parts of a revolution or more.
+    The error is that of the jackknife, which leaves out one part of the record, of a revolution or more, at a time.
     """
     count = min(PARTS, len(x) // samples)
     if count < 2:

@@ -32,7 +32,7 @@ from ..bearing import (
     rolling_couple,
     vg,
 )
-from ..forces import Land, LandContact, RibFilm
+from ..forces import Land, LandContact, RibFilm, film_resistance, film_scale
 from .bearing_field import BearingAtSpeed
 from .bearing_reports import QUANTITIES
 from .bearing_states import BESIDE, OF_BODIES, OF_ROLLER, WATCHED, BearingState, Bodies, Rollers
@@ -227,9 +227,10 @@ class BearingModel(AbstractForcedSystem):
     def slowness(self, speed: Scalar) -> Array:
         """The larger of `periods` and of what the film needs at the land, where explicit steps are as short as the time
         in which it stops a light cage in thick oil, 1 to `SLOWEST`."""
-        c, e, film = self.clearance, self.contact.onset, self.film
-        size = film.n_lands * self.lubricant.dynamic_viscosity * self.land_radius * (film.land_width / c) ** 3
-        rate = size * jnp.pi / 2 * (1 + 2 * e**2) / (1 - e**2) ** 2.5 / self.cage_mass
+        c, film = self.clearance, self.film
+        scale = film.n_lands * film_scale(self.lubricant.dynamic_viscosity, self.land_radius, film.land_width, c)
+        outward = film_resistance("fixed_half", self.contact.onset, 0.0, (1.0, 0.0), (0.0, 0.0)).xx
+        rate = scale * outward / (c * self.cage_mass)
         stiff = rate * SPACING / jnp.abs(self.rolling_cage_speed(speed)) / self.steps.most
         return jnp.clip(jnp.maximum(self.periods(speed), stiff), 1.0, SLOWEST)
 
