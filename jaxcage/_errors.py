@@ -36,20 +36,33 @@ class NoResult(Exception):
     """Computation without a result; the message says why."""
 
 
+LONGEST = 100
+"""Characters of a value that a message shows."""
+
+
+def visible(text: str) -> str:
+    """The text with characters spelt out that move the cursor or turn the direction of writing."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def printable(text: str) -> str:
+    """The text for a message: on one line, shortened, without control characters."""
+    return visible(text[:LONGEST]) + "..." * (len(text) > LONGEST)
+
+
 def shown(value: Any) -> str:
-    """Text of a value for messages."""
-    plain = bool | int | float | complex | str
-    row = isinstance(value, tuple | list) and all(isinstance(x, plain) for x in value)
-    if row or isinstance(value, plain | np.generic):
-        try:
-            text = repr(value) if row or isinstance(value, str | complex) else str(value)
-        except ValueError:  # an integer with thousands of digits
-            return f"a very large {type(value).__name__}"
-        return text if len(text) < 100 else f"{text[:100]}..."
+    """Any value for a message: arrays by their shape, objects by their kind."""
+    if isinstance(value, np.generic):
+        value = value.item()
     if kind_of := getattr(value, "dtype", None):
         kind = "a masked array" if isinstance(value, np.ma.MaskedArray) else "an array"
         return f"{kind} of shape {np.shape(value)} and kind {kind_of}"
-    return f"something of kind {type(value).__name__}"
+    if type(value).__module__ not in ("builtins", "datetime"):
+        return f"something of kind {type(value).__name__}"
+    try:
+        return printable(repr(value))
+    except (RecursionError, ValueError):  # nested a thousand times, or of thousands of digits
+        return f"a very large {type(value).__name__}"
 
 
 def parameters_like(given: str, names: Sequence[str]) -> str:

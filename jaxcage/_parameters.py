@@ -6,7 +6,6 @@ They serve the configuration reader, `replace` and `parameters` (access by name)
 import dataclasses
 import functools
 import math
-import reprlib
 from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from typing import Any, TypeVar
@@ -28,7 +27,7 @@ from ._allowed import (
     must_be_given as must_be_given,
     within as within,
 )
-from ._errors import ArgumentError, InputError, parameters_like
+from ._errors import ArgumentError, InputError, parameters_like, shown
 
 
 M = TypeVar("M", bound=eqx.Module)
@@ -50,7 +49,7 @@ def _leaf_of(info: "ParameterInfo", x: Any) -> Any:
     """Convert the value of a declared parameter. **Raises:** `ValueError` unless it is real, a number or an array,
     and within its range; traced ones pass."""
     if isinstance(x, _NO_NUMBERS) or (isinstance(x, np.ndarray | np.generic) and x.dtype.kind not in "iuf"):
-        raise InputError(f"The {info.text} {allowed(info)}, but {x!r} was given.")
+        raise InputError(f"The {info.text} {allowed(info)}, but {shown(x)} was given.")
     if (wrong := _out_of_range(x, info)) is not None:
         raise InputError(f"The {info.text} {allowed(info)}, but {wrong:g} was given.")
     return _as_leaf(x)
@@ -226,8 +225,7 @@ def parameter_info(module: eqx.Module) -> dict[str, ParameterInfo]:
 
 def _require_module(module: Any) -> None:
     if not isinstance(module, eqx.Module):
-        given = repr(module) if isinstance(module, str | int | float) else f"something of kind {type(module).__name__}"
-        raise ArgumentError("module", said=f"must be a model or a part of one, but {given} was given.")
+        raise ArgumentError("module", said=f"must be a model or a part of one, but {shown(module)} was given.")
 
 
 _BASES = {  # exponents of mass, length and time
@@ -324,7 +322,7 @@ def _changed(module: Any, changes: Mapping[tuple[str, ...], Any]) -> Any:
 def require_range(name: str, value: Any, info: ParameterInfo) -> None:
     """Require a value within its range; traced ones pass. **Raises:** `ValueError` otherwise."""
     if isinstance(value, _NO_NUMBERS):
-        raise ArgumentError(name, said=f"{allowed(info)}, but {reprlib.repr(value)} was given.")
+        raise ArgumentError(name, said=f"{allowed(info)}, but {shown(value)} was given.")
     if (wrong := _out_of_range(value, info)) is not None:
         unit = "" if info.unit in ("1", UNKNOWN) else f" {info.unit}"
         raise ArgumentError(name, said=f"{allowed(info)}, but is {wrong:g}{unit}.")

@@ -11,7 +11,7 @@ from report_example import orbits, swept
 
 import jaxcage as jc
 from jaxcage.cli.orbit_commands import of_orbits
-from jaxcage.cli.subject import Subject
+from jaxcage.cli.subject import read_case
 from jaxcage.design import Checked, Ensemble, indices, range_chance
 from jaxcage.files import Range, Unknown
 from jaxcage.show import forces_note, indices_note, range_sentence
@@ -143,7 +143,7 @@ def test_narrow_ranges_do_not_count_where_an_orbit_is_said_to_be_stable():
     low, high = found.stretches
     parts = dataclasses.replace(high, upper_rpm=14e3), dataclasses.replace(high, lower_rpm=14.3e3)
     found = dataclasses.replace(found, stretches=(low, *parts), sweep=sweep)
-    said = of_orbits(Subject("1a", jc.case("1a")), found, jc.unstable_ranges(found)).sentence
+    said = of_orbits(read_case("1a"), found, jc.unstable_ranges(found)).sentence
     assert "except 7000 to 12000 rpm, from 20000 rpm on (ranges narrower than 500 rpm do not count)." in said
 
 

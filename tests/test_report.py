@@ -15,7 +15,7 @@ from report_example import RATIO, orbits, sections, swept
 import jaxcage as jc
 from jaxcage.cli.options import read_range
 from jaxcage.cli.orbit_commands import of_orbits
-from jaxcage.cli.subject import Subject
+from jaxcage.cli.subject import read_case
 from jaxcage.show import page
 
 
@@ -30,7 +30,7 @@ def text() -> str:
 
 def test_an_orbit_that_is_nowhere_stable_is_no_stable_one():
     found = dataclasses.replace(orbits(swept()), stretches=())
-    said = of_orbits(Subject("1a", jc.case("1a")), found, jc.unstable_ranges(found)).sentence
+    said = of_orbits(read_case("1a"), found, jc.unstable_ranges(found)).sentence
     assert said == "No synchronous orbit that was found is stable."
 
 
@@ -47,8 +47,7 @@ def test_an_operating_range_is_read(text: str, expected: tuple[float, float]):
     found = read_range(text)
     assert found == pytest.approx(expected, rel=1e-12)
     assert [getattr(end, "whose", None) for end in found] == ["shaft" if "shaft" in text else None] * 2
-    model = jc.case("1a")
-    cage, _ = Subject("1a", model).operating(found)[1]
+    cage, _ = read_case("1a").operating(found)[1]
     assert cage == pytest.approx(expected[0] * (RATIO if "shaft" in text else 1) * PER_RPM)
 
 

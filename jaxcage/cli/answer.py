@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import jaxcage as jc
 
-from .progress import visible
+from .._errors import visible
 from .subject import Subject
 
 

@@ -12,11 +12,11 @@ import tyro
 
 import jaxcage as jc
 
-from .._errors import InputError
+from .._errors import InputError, visible
 from . import options as o
 from .answer import Answer
 from .orbit_commands import bars, explained, gradient, mapped, of_orbits
-from .progress import interrupted, report as tell, report_lanes, say, visible
+from .progress import interrupted, report as tell, report_lanes, say
 from .speed_commands import chances, simulate, swept
 from .subject import RPM, Subject
 
@@ -198,7 +198,7 @@ def report(
         fastest = None if at is None else jc.files.SpeedOf(at[1] * RPM, subject.own)
         loads = statics(subject, speed=fastest)  # the verdict with rollers compares the minimum load already
         parts.append(("Statics", dataclasses.replace(loads, notes=()) if subject.with_rollers and at else loads))
-    design = jc.show.sources_table(subject.model, subject.file)
+    design = jc.show.sources_table(subject.model, subject.file if subject.path else None)
     made = jc.show.settings_table(found, time.perf_counter() - began)
     sections = [_section(*part) for part in parts]
     sections.append(jc.show.Section("The design", tables=[design], notes=subject.about(False)[1][:1]))

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any, TypeAlias
 
-from .._errors import Stop
+from .._errors import Stop, visible
 
 
 SECONDS_BETWEEN_LINES = 10.0
@@ -60,11 +60,6 @@ def ends() -> bool:
 def say(text: str) -> None:
     """Print one line on standard error."""
     print(visible(" ".join(text.split())), file=sys.stderr)
-
-
-def visible(text: str) -> str:
-    """The text with characters spelt out that move the cursor or turn the direction of writing."""
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def shorten_warnings() -> None:

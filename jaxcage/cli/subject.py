@@ -32,10 +32,9 @@ class Subject:
     name: str
     """Name of the case, or of the TOML file without its ending and with `_` for characters that no figure can show."""
     model: Any
-    published: "PublishedCase | None" = None
-    file: "BearingFile | None" = None
+    file: "BearingFile"
     path: str = ""
-    """Path of the file as it was given."""
+    """Path of the file as it was given; empty for a case."""
     bare: Any = None
     """Owner of speeds given as bare numbers, `cage` or `shaft`; None for that of the file or the model."""
 
@@ -47,12 +46,17 @@ class Subject:
     @property
     def speeds(self) -> Any:
         """Owner of speeds that are given as bare numbers: `cage` or `shaft`."""
-        return self.bare or (self.own if self.file is None else self.file.speeds)
+        return self.bare or self.file.speeds
 
     @property
     def unknowns(self) -> "tuple[Unknown, ...]":
         """Values of which the file knows a range only."""
-        return () if self.file is None else self.file.unknowns
+        return self.file.unknowns
+
+    @property
+    def published(self) -> "PublishedCase | None":
+        """What is published of the case."""
+        return None if self.path else jc.bearing.PUBLISHED_CASES.get(self.name)
 
     @property
     def with_rollers(self) -> bool:
@@ -154,14 +158,13 @@ class Subject:
         """Entries of the case in every document, and sentences about it; best guesses only where these were taken."""
         from .._parameters import readings_of  # loads JAX
 
-        left, estimated = ((), ()) if self.file is None else (self.file.left, self.file.estimated)
+        left, estimated = self.file.left, self.file.estimated
         guesses = [] if by_ranges else [u.label for u in self.unknowns]
         document: dict[str, Any] = {"readings": {name: way for name, (way, _) in readings_of(self.model).items()}}
         document |= {} if self.shaft is None else {"cage_speed_ratio": 1 / self.shaft}
         document |= {"load_N": float(self.model.load)} if self.with_rollers else {}
-        document |= (
-            {} if self.file is None else {"left_as_in_template": left, "estimated": estimated, "best_guesses": guesses}
-        )
+        if self.path:
+            document |= {"left_as_in_template": left, "estimated": estimated, "best_guesses": guesses}
         notes = {
             "Readings": [*filter(None, [jc.show.readings_words(self.model)])],
             "Lines still as `jaxcage init` wrote them (change or delete the comment of one that is yours)": left,
@@ -171,68 +174,58 @@ class Subject:
         return document, [f"{what}: {', '.join(values)}" for what, values in notes.items() if values]
 
 
-def _is_file(given: str) -> bool:
-    return Path(given).suffix.lower() == ".toml" or os.path.exists(given)
-
-
-def check_case(given: str, speeds: dict[str, float | None]) -> "Description":
-    """Check the name of a case, or the keys and values of a TOML file, and speeds by option, without loading JAX.
-
-    **Returns:** what is described.
+def described(given: str) -> "Description":
+    """A published case, a bearing with its rollers or a TOML file, checked without loading JAX.
 
     **Raises:** `InputError`.
     """
     from ..files import declarations, describe, read_description
 
-    cases, bearings = (each["bases"] for each in declarations()["subjects"].values())
-    listed = given in cases or given.lower() in bearings
-    if not listed and not _is_file(given):
-        known = ", ".join([*cases, *bearings])
-        raise InputError(f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file.")
-    found = describe({"base": given.lower()}) if listed else read_description(given)
+    listed = [name for each in declarations()["subjects"].values() for name in each["bases"]]
+    if given.lower() in listed:
+        return describe({"base": given.lower()})
+    if Path(given).suffix.lower() == ".toml" or os.path.exists(given):
+        return read_description(given)
+    raise InputError(f"Case '{given}' is unknown: it must be one of {', '.join(listed)}, or the path of a TOML file.")
+
+
+def check_speeds(found: "Description", speeds: dict[str, float | None]) -> None:
+    """Check the speeds that options give, by option, without loading JAX. **Raises:** `InputError`."""
     first, last = speeds.get("first"), speeds.get("last")
     if first and last and last <= first and type(first) is type(last):
         between = f"{first:g} to {last:g} rpm of the {getattr(first, 'whose', found.speeds)}"
         raise InputError(f"Option --last must be above --first, but the range is {between}.")
     n = found.numbers
     if n.get("guidance") == "inner" or "outer_speed" in n:  # `Subject.rpm` knows them
-        return found
+        return
     for option, speed in speeds.items():
         if speed is not None:
             whose = getattr(speed, "whose", found.speeds)
             ratio = 1.0 if whose == "cage" else cage_speed_ratio(n["inner_raceway_diameter"], n["roller_diameter"])
             require_cage_rpm(flag(option), speed * ratio, land_radius(n["rib_diameter"], n["guidance_gap"]))
-    return found
 
 
 def read_case(given: str) -> Subject:
-    """A case or TOML file that passed `check_case`.
+    """A case or a TOML file that was `described`, with its model.
 
-    A broken design rule and an oil that is too thin are reported on standard error.
+    A broken design rule, an oil that is too thin and one that is too hot for the cage are reported on standard error.
 
     **Raises:** `InputError`.
     """
-    cases = jc.bearing.PUBLISHED_CASES
-    if given in cases:
-        found = Subject(given, jc.case(given), cases[given])
-    elif given.lower() in jc.models.WHOLE_BEARINGS:
-        found = Subject(given.lower(), jc.whole_bearing(given))
+    about = described(given)
+    if about.base == given.lower():
+        found = Subject(about.base, (file := jc.files.built(about)).model, file)
     else:
-        file, name = jc.files.read_bearing(given), Path(given).stem
-        name = "".join(c if c.isprintable() and c != "$" else "_" for c in name[:LONGEST])
-        found = Subject(name, file.model, None, file, given)
+        name = "".join(c if c.isprintable() and c != "$" else "_" for c in Path(given).stem[:LONGEST])
+        found = Subject(name, (file := jc.files.read_bearing(given)).model, file, given)
     if broken := jc.bearing.design_rule_violations(found.model.bearing, found.model.guidance_gap):
-        estimated = () if found.file is None else found.file.estimated
-        if "bearing.pocket_clearance" in estimated and any("T =" in words for words in broken):
+        if "bearing.pocket_clearance" in file.estimated and any("T =" in words for words in broken):
             broken.append("T is estimated: give pocket_clearance below [bearing] if you know it.")
         say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
     for doubt in found.model.lubricant.doubts():
         say(f"Warning: {doubt}")
-    material, oil = None if found.file is None else found.file.material, float(found.model.lubricant.temperature)
-    if material is not None and oil > material.limit:
-        kelvin = 273.15
-        say(
-            f"Warning: the oil of {oil - kelvin:.0f} degC is hotter than a cage of {material.name} bears, "
-            f"{material.limit - kelvin:.0f} degC."
-        )
+    oil, kelvin = float(found.model.lubricant.temperature), 273.15
+    if file.material is not None and oil > (limit := file.material.limit):
+        hot = f"the oil of {oil - kelvin:.0f} degC is hotter than a cage of {file.material.name} bears"
+        say(f"Warning: {hot}, {limit - kelvin:.0f} degC.")
     return found

@@ -35,7 +35,7 @@ from .progress import (
     say,
     shorten_warnings,
 )
-from .subject import check_case, read_case
+from .subject import check_speeds, described, read_case
 
 
 if TYPE_CHECKING:
@@ -99,8 +99,9 @@ def _run(call: functools.partial[Answer]) -> None:
     operating = call.keywords.get("operating") or getattr(call.keywords.get("calm"), "operating", None)
     if operating is not None:
         speeds["operating"] = operating[1]
-    found = check_case(call.keywords["subject"], speeds)
-    _check_kind(call, found, check_case(call.keywords["other"], {}) if "other" in call.keywords else found)
+    found = described(call.keywords["subject"])
+    check_speeds(found, speeds)
+    _check_kind(call, found, described(call.keywords["other"]) if "other" in call.keywords else found)
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells where it stores fonts if there is no home folder
     import jax
 

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from .config import (
         BearingFile as BearingFile,
         Unknown as Unknown,
+        built as built,
         load_model as load_model,
         model_from as model_from,
         read_bearing as read_bearing,

@@ -32,7 +32,6 @@ from .description import ConfigError, Description, Part, Ranges, describe, read_
 from .plausibility import check_together
 from .ranges import Range
 from .schema import modules
-from .units import Whose
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,24 +45,14 @@ class Unknown:
     range: Range
 
 
-@dataclasses.dataclass(frozen=True)
-class BearingFile:
-    """Contents of a TOML file: a model, and how its speeds are meant."""
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class BearingFile(Description):
+    """Contents of a TOML file, and the model that it describes."""
 
     model: Any
     """A `CageModel` or a `BearingModel`."""
-    speeds: Whose
-    """Owner of the speeds that commands give as bare numbers: key `speeds`; by default the cage, for a whole bearing
-    the shaft."""
     unknowns: tuple[Unknown, ...]
     """Values of which the file gives a range only."""
-    left: tuple[str, ...]
-    """Dotted names of values on lines that are still as `jaxcage init` wrote them."""
-    estimated: tuple[str, ...]
-    """Dotted names of values that the file does not give, estimated from dimensions or from the cage material."""
-    material: CageMaterial | None
-    """Material of the cage, if it is named."""
-    table: Mapping[str, Any]
 
 
 def load_model(path: str | Path) -> Any:
@@ -80,34 +69,30 @@ def read_bearing(path: str | Path) -> BearingFile:
     **Raises:** `ConfigError`, a `ValueError` whose message is one sentence that names the file, the key, the value
     given and what is allowed; `RuntimeError` without double precision.
     """
-    found, unknowns = read_description(path), []
+    found = read_description(path)
     try:
-        model = _model(found, unknowns)
+        return built(found)
     except ConfigError as error:
         raise ConfigError(f"File '{path}': {error}") from error
-    return BearingFile(model, found.speeds, tuple(unknowns), found.left, found.estimated, found.material, found.table)
 
 
-def model_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) -> Any:
+def model_from(table: Mapping[str, Any]) -> Any:
     """The `CageModel` or `BearingModel` that a nested mapping, as read from TOML, describes; a range counts with its
     best guess.
 
-    **Arguments:** the mapping; a list to which the values known within ranges only are added.
-
     **Raises:** `ConfigError`; `RuntimeError` without double precision.
     """
-    return _model(describe(table), unknowns)
+    return built(describe(table)).model
 
 
-def _model(found: Description, unknowns: list[Unknown] | None) -> Any:
+def built(found: Description) -> BearingFile:
+    """A description with its model. **Raises:** as `model_from`."""
     require_x64()
     start = None if found.base is None else (case if found.subject == "cage" else whole_bearing)(found.base)
     root = found.root if found.material is None else _filled(found.root, found.material, start)
     model: Any = _build(root, start, ())
     check_together(model)
-    if unknowns is not None:
-        unknowns += _named(model, found.ranges)
-    return model
+    return BearingFile(**vars(found), model=model, unknowns=_named(model, found.ranges))
 
 
 def _filled(root: Part, material: CageMaterial, start: Any) -> Part:
@@ -131,23 +116,23 @@ def _filled(root: Part, material: CageMaterial, start: Any) -> Part:
     return dataclasses.replace(root, values=own, parts=parts)
 
 
-def _named(model: eqx.Module, ranges: Ranges) -> list[Unknown]:
+def _named(model: eqx.Module, ranges: Ranges) -> tuple[Unknown, ...]:
     """Ranges by the names that `jaxcage.replace` knows; a key that sets several parameters is one unknown."""
     short = {path: name for name, path in parameter_paths(model).items()}
     each = lambda path, names: tuple(short[(*path[:-1], name)] for name in names)
-    return [Unknown(".".join(path), each(path, names), found) for path, (found, names) in ranges.items()]
+    return tuple(Unknown(".".join(path), each(path, names), found) for path, (found, names) in ranges.items())
 
 
 def _build(part: Part, start: Any, path: tuple[str, ...]) -> eqx.Module:
     """The module of a table; values not in the table come from `start`, or from the defaults."""
-    kind = modules()[part.module]
-    if part.ready_made is not None:
-        key, value = part.ready_made
-        start = _READY_MADE[key](value)
+    kind, values = modules()[part.module], dict(part.values)
+    for key, make in _READY_MADE.items():
+        if key in values:
+            start = make(values.pop(key))
     start = start if isinstance(start, kind) else None
     arguments = {} if start is None else {f.name: getattr(start, f.name) for f in dataclasses.fields(kind)}
     below = {name: _build(x, getattr(start, name, None), (*path, name)) for name, x in part.parts.items()}
-    arguments |= {**part.values, **below}
+    arguments |= {**values, **below}
     try:
         return kind(**fields_from(kind, arguments))
     except ValueError as error:

@@ -25,12 +25,12 @@ from .._bearing_data import (
     estimated,
     rolling_coefficient,
 )
-from .._errors import ConfigError
+from .._errors import ConfigError, printable, shown
 from .disk import read_bytes
 from .plausibility import check_numbers
 from .ranges import Range, is_range, read_range
 from .template import Subject, left_as_written
-from .units import NUMBER, WHOSE, Whose, printable, read_rpm, shown, to_si
+from .units import NUMBER, WHOSE, Whose, read_rpm, to_si
 
 
 SCHEMA = Path(__file__).with_name("schema.json")
@@ -55,29 +55,6 @@ _WITHOUT_UNIT = re.compile(rf"\s*{NUMBER}[-+±.()\s\deE]*")
 _GRADE = re.compile(rf"\s*G\s*({NUMBER})\s*(?:at\b\s*(.*?)\s*)?", re.IGNORECASE)
 
 
-class Known(float):
-    """Best guess of a value that is known within a range only."""
-
-    range: Range
-
-    def __new__(cls, found: Range) -> "Known":
-        number = super().__new__(cls, found.best)
-        number.range = found
-        return number
-
-
-@dataclasses.dataclass(frozen=True)
-class Balance:
-    """An eccentricity given by a balance grade and the speed to which it belongs."""
-
-    text: str
-    grade: float
-    """Eccentricity times angular speed [mm/s], ISO 21940-11."""
-    speed: float
-    """[rad/s]."""
-    whose: Whose
-
-
 @dataclasses.dataclass(frozen=True)
 class Part:
     """A table that passed: what it builds."""
@@ -85,10 +62,8 @@ class Part:
     module: str
     """Name of the class."""
     values: dict[str, Any]
-    """Numbers in SI, choices and counts by field; a `Known` for a range."""
+    """Numbers in SI, best guesses, choices and counts by field; `designation` and `grade` of what is ready made."""
     parts: Mapping[str, "Part"]
-    ready_made: tuple[str, Any] | None
-    """Key and value by which the table starts from a ready-made module, such as `designation`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,6 +73,7 @@ class Description:
     subject: Subject
     base: str | None
     speeds: Whose
+    """Owner of the speeds that commands give as bare numbers; by default the cage, for a whole bearing the shaft."""
     root: Part
     ranges: Ranges
     table: Mapping[str, Any]
@@ -114,8 +90,7 @@ class Description:
         bases, bearing = declarations()["subjects"][self.subject]["bases"], self.root.parts.get("bearing")
         found = {} if self.base is None else {**bases[self.base]}
         if bearing is not None:
-            found |= declarations()["catalogue"][bearing.ready_made[1]] if bearing.ready_made else {}
-            found |= bearing.values
+            found |= declarations()["catalogue"].get(bearing.values.get("designation"), {}) | bearing.values
         film = self.root.parts["film"].values if "film" in self.root.parts else {}
         impact = {"impact": self.root.parts["impact"].module} if "impact" in self.root.parts else {}
         return {**found, **film, **impact, **self.root.values}
@@ -152,27 +127,30 @@ def describe(table: Mapping[str, Any]) -> Description:
     subject = _subject(table)
     module, bases = (declarations()["subjects"][subject][key] for key in ("module", "bases"))
     base, speeds = table.get("base"), table.get("speeds", "shaft" if subject == "bearing" else "cage")
-    if speeds not in WHOSE:
-        raise ConfigError(f"`speeds` must be one of {', '.join(WHOSE)}, but is {shown(speeds)}.")
-    if "base" in table and base not in [*bases]:  # of any type
-        raise ConfigError(f"`base` must be one of {', '.join(bases)}, but is {shown(base)}.")
+    _one_of("speeds", WHOSE, speeds)
+    if "base" in table:
+        _one_of("base", bases, base)
     ranges: Ranges = {}
     rest = {key: value for key, value in table.items() if key not in ("speeds", "model", "base", "material")}
     material = _listed("material", table["material"], cage_material, "PEEK-GF30") if "material" in table else None
     made = {} if material is None else BY_MATERIAL[subject]
     if made and subject == "bearing":
         rest = {"pockets": {}, "wear": {}} | rest
-    root = _checked(module, rest, base is not None, (), ranges, speeds, tuple(made))
+    grade = _GRADE.fullmatch(given) if isinstance(given := rest.get("eccentricity"), str) else None
+    by_grade = set() if grade is None else {"eccentricity"}
+    numbers = {key: value for key, value in rest.items() if key not in by_grade}
+    root = _checked(module, numbers, base is not None, (), ranges, {*made, *by_grade})
     if base is None and root.values.get("guidance") == "inner" and "inner_land_diameter" not in rest:
         raise ConfigError('`inner_land_diameter` must be given with guidance = "inner".')
     bearing = root.parts.get("bearing")
     guessed: tuple[str, ...] = ()
     if bearing is not None:
-        names = bearing.values if bearing.ready_made is None else estimated(bearing.ready_made[1])
+        listed = bearing.values.get("designation")
+        names = bearing.values if listed is None else estimated(listed)
         guessed = tuple(f"bearing.{name}" for name in names if name not in rest["bearing"])
         drag = root.parts["drag"].values if "drag" in root.parts else {}
-        if bearing.ready_made:
-            drag.setdefault("rolling_coefficient", rolling_coefficient(bearing.ready_made[1]))
+        if listed is not None:
+            drag.setdefault("rolling_coefficient", rolling_coefficient(listed))
         elif base is None and "rolling_coefficient" not in drag and drag.get("rolling_law", "none") != "none":
             guessed += ("drag.rolling_coefficient",)
     told = {*rest, *(f"lubricant.{name}" for name in rest.get("lubricant", ()))}
@@ -180,15 +158,9 @@ def describe(table: Mapping[str, Any]) -> Description:
     own = {**rest, **rest.get("pockets", {}), **rest.get("wear", {})}
     guessed += tuple(where for name, where in made.items() if name not in own)
     found = Description(subject, base, speeds, root, ranges, table, guessed, material)
-    if isinstance(given := root.values.get("eccentricity"), Balance):
-        cage, n = given.speed, found.numbers
-        if given.whose == "shaft":
-            ratio = cage_speed_ratio(n["inner_raceway_diameter"], n["roller_diameter"])
-            cage = abs(ratio * cage + (1 - ratio) * n.get("outer_speed", 0.0))
-        value = 1e-3 * given.grade / cage if cage else math.inf  # ISO 21940-11
-        root.values["eccentricity"] = value
-        declared = declarations()["modules"][module]["values"]["eccentricity"]
-        require_within("eccentricity", value, ParameterInfo(**declared, text=""), given.text)
+    if grade is not None:
+        info = ParameterInfo(**declarations()["modules"][module]["values"]["eccentricity"], text="")
+        root.values["eccentricity"] = _by_grade(grade, speeds, found.numbers, info)
     check_numbers(found.numbers)
     return found
 
@@ -196,9 +168,13 @@ def describe(table: Mapping[str, Any]) -> Description:
 def _subject(table: Mapping[str, Any]) -> Subject:
     base = table.get("base")
     whole = isinstance(base, str) and base in declarations()["subjects"]["bearing"]["bases"]
-    given = table.get("model", "bearing" if whole else "cage")
-    if given not in get_args(Subject):
-        raise ConfigError(f"`model` must be one of {', '.join(get_args(Subject))}, but is {shown(given)}.")
+    return _one_of("model", get_args(Subject), table.get("model", "bearing" if whole else "cage"))
+
+
+def _one_of(name: str, offered: Iterable[str], given: Any) -> Any:
+    if given not in [*offered]:  # of any type
+        is_what = "missing" if given is None else shown(given)
+        raise ConfigError(f"`{name}` must be one of {', '.join(offered)}, but is {is_what}.")
     return given
 
 
@@ -208,26 +184,28 @@ def _checked(
     started: bool,
     path: tuple[str, ...],
     ranges: Ranges,
-    speeds: Whose,
-    made: tuple[str, ...],
+    made: set[str],
 ) -> Part:
     """A table of values of a module; `started` if there is a base from which it takes what it leaves out. Names in
     `made` need not be given."""
-    declared, table, ready_made = declarations()["modules"][module], dict(table), None
+    declared = declarations()["modules"][module]
     fields, nested = declared["values"], declared["tables"]
-    for (where, key), read in _READY_MADE.items():
-        if (where,) == path and key in table:
-            ready_made, started = (key, read(table.pop(key))), True
     _refuse_unknown(table, fields, nested, path)
-    found = {name: _value(_dotted(path, name), table[name], fields[name], speeds) for name in fields if name in table}
+    ready_made = {
+        key: read(table[key]) for (where, key), read in _READY_MADE.items() if (where,) == path and key in table
+    }
+    started = started or bool(ready_made)
+    best = lambda value: value.best if isinstance(value, Range) else value
+    given = {name: _value(_dotted(path, name), table[name], fields[name]) for name in fields if name in table}
+    found = {name: best(value) for name, value in given.items()}
     for where, names in _SHORTHANDS.items():
         if where[:-1] == path and where[-1] in table:
-            value = _value(_dotted(path, where[-1]), table[where[-1]], fields[names[0]], speeds)
+            value = _value(_dotted(path, where[-1]), table[where[-1]], fields[names[0]])
             free = tuple(name for name in names if name not in found)
-            if isinstance(value, Known) and free:
-                ranges[where] = value.range, free
-            found = dict.fromkeys(names, float(value)) | found
-    ranges |= {(*path, name): (value.range, (name,)) for name, value in found.items() if isinstance(value, Known)}
+            if isinstance(value, Range) and free:
+                ranges[where] = value, free
+            found = dict.fromkeys(names, best(value)) | found
+    ranges |= {(*path, name): (value, (name,)) for name, value in given.items() if isinstance(value, Range)}
     parts = {}
     for name in (name for name in nested if name in table):
         below, options = table[name], nested[name]
@@ -235,11 +213,11 @@ def _checked(
             raise ConfigError(f"`{_dotted(path, name)}` must be a table of values, but is {shown(below)}.")
         kind = _kind(options, below, started, (*path, name))
         below = {key: value for key, value in below.items() if key != "kind" or len(options) == 1}
-        parts[name] = _checked(kind, below, started and kind == options[0], (*path, name), ranges, speeds, made)
+        parts[name] = _checked(kind, below, started and kind == options[0], (*path, name), ranges, made)
     if not started:
         found = clearances(found) | found if module == "Bearing" else found
         _require_whole(module, {*found, *parts, *made}, path)
-    return Part(module, found, parts, ready_made)
+    return Part(module, ready_made | found, parts)
 
 
 def _kind(options: list[str], table: Mapping[str, Any], started: bool, path: tuple[str, ...]) -> str:
@@ -247,10 +225,7 @@ def _kind(options: list[str], table: Mapping[str, Any], started: bool, path: tup
     if len(options) == 1:
         return options[0]
     names = [declarations()["modules"][option]["kind"] for option in options]
-    given = table.get("kind", names[0] if started else None)
-    if given not in names:
-        given = "missing" if given is None else shown(given)
-        raise ConfigError(f"`{_dotted(path, 'kind')}` must be one of {', '.join(names)}, but is {given}.")
+    given = _one_of(_dotted(path, "kind"), names, table.get("kind", names[0] if started else None))
     return options[names.index(given)]
 
 
@@ -279,7 +254,7 @@ def _refuse_unknown(
     keys = [*fields, *(where[-1] for where in _SHORTHANDS if where[:-1] == path)]
     extra = [key for where, key in _READY_MADE if (where,) == path] if path else ["base", "model", "speeds", "material"]
     for key in table:
-        if key in keys or key in nested:
+        if key in (*extra, *keys, *nested):
             continue
         where = f" in [{_dotted(path)}]" if path else " at the top level"
         for subject, about in declarations()["subjects"].items():
@@ -292,35 +267,37 @@ def _refuse_unknown(
         raise ConfigError(f"Key `{printable(key)}`{where} must be one of {offered}.")
 
 
-def _value(name: str, value: Any, declared: Mapping[str, Any], speeds: Whose) -> Any:
-    """`value` as the configuration gives it, checked against its declaration."""
+def _value(name: str, value: Any, declared: Mapping[str, Any]) -> Any:
+    """`value` as the configuration gives it, checked against its declaration; a `Range` for what may be one."""
     if "choice" in declared:
-        if value not in declared["choice"]:
-            raise ConfigError(f"`{name}` must be one of {', '.join(declared['choice'])}, but is {shown(value)}.")
-        return value
+        return _one_of(name, declared["choice"], value)
     if "count" in declared:
         lower, upper = declared["count"]
         if isinstance(value, bool) or not isinstance(value, int) or not lower <= value <= upper:
             raise ConfigError(f"`{name}` must be a whole number from {lower} to {upper}, but is {shown(value)}.")
         return value
-    info = ParameterInfo(**declared, text="")
-    if name == "eccentricity" and isinstance(value, str) and (grade := _GRADE.fullmatch(value)):
-        return _balance(value, float(grade[1]), grade[2], speeds)
-    return _number(name, value, info)
+    return _number(name, value, ParameterInfo(**declared, text=""))
 
 
-def _balance(text: str, grade: float, at: str | None, speeds: Whose) -> Balance:
+def _by_grade(given: re.Match[str], speeds: Whose, n: Mapping[str, Any], info: ParameterInfo) -> float:
+    """The eccentricity [m] that a balance grade allows at a speed: G [mm/s] over that of the cage, ISO 21940-11."""
     must = '`eccentricity` must name the speed of its balance grade, such as "G6.3 at 12000 rpm shaft"'
     try:
-        speed = read_rpm(at) if at else 0.0
+        speed = read_rpm(given[2]) if given[2] else 0.0
     except ValueError as error:
         raise ConfigError(f"{must}, but {error}.") from error
-    if not (grade > 0 and 0 < speed < math.inf):
-        raise ConfigError(f'{must}, but is "{printable(text)}".')
-    return Balance(text, grade, speed * math.pi / 30, getattr(speed, "whose", speeds))
+    if not (float(given[1]) > 0 and 0 < speed < math.inf):
+        raise ConfigError(f'{must}, but is "{printable(given[0])}".')
+    cage = speed * math.pi / 30
+    if getattr(speed, "whose", speeds) == "shaft":
+        ratio = cage_speed_ratio(n["inner_raceway_diameter"], n["roller_diameter"])
+        cage = abs(ratio * cage + (1 - ratio) * n.get("outer_speed", 0.0))
+    value = 1e-3 * float(given[1]) / cage if cage else math.inf
+    require_within("eccentricity", value, info, given[0])
+    return value
 
 
-def _number(name: str, value: Any, info: ParameterInfo) -> float:
+def _number(name: str, value: Any, info: ParameterInfo) -> float | Range:
     must = f"`{name}` {must_be(info)}"
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ConfigError(f"{must}, but is {shown(value)}.")
@@ -329,14 +306,14 @@ def _number(name: str, value: Any, info: ParameterInfo) -> float:
         raise ConfigError(f'{must}, but "{printable(value)}" has no unit: write "{example}" if that is meant.')
     try:
         if isinstance(value, str) and is_range(value):
-            number = Known(read_range(value, info.unit))
+            number = read_range(value, info.unit)
         else:
             number = to_si(value, info.unit) if isinstance(value, str) else float(value)
     except ValueError as error:
         raise ConfigError(f"{must}, but {error}.") from error
     except OverflowError as error:  # of a whole number
         raise ConfigError(f"{must}, but is {shown(value)}.") from error
-    for each in (number.range.lower, number.range.upper) if isinstance(number, Known) else (number,):
+    for each in (number.lower, number.upper) if isinstance(number, Range) else (number,):
         require_within(name, each, info, value)
     return number
 

@@ -16,9 +16,9 @@ import re
 from pathlib import Path
 from typing import Any, Literal
 
-from .description import ConfigError
+from .._errors import ConfigError, printable
 from .disk import read_bytes
-from .units import Whose, printable, split_owner, to_si
+from .units import Whose, split_owner, to_si
 
 
 Quantity = Literal["whirl frequency", "orbit size", "rattles", "calm"]

@@ -7,8 +7,8 @@ import re
 import numpy as np
 from jaxtyping import Float
 
-from .._errors import ArgumentError
-from .units import NUMBER, printable, to_si
+from .._errors import ArgumentError, printable
+from .units import NUMBER, to_si
 
 
 DECADE = 10.0

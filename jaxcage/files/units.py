@@ -5,6 +5,8 @@ import math
 import re
 from typing import TYPE_CHECKING, Any, Literal
 
+from .._errors import printable
+
 
 if TYPE_CHECKING:
     import pint
@@ -24,8 +26,6 @@ _TOWER = re.compile(r"[\d)]\s*(?:\^|\*\*)|\d{3}")
 """A power of a number, or a large number: pint would evaluate 9**9**9 to its last digit."""
 _LIKE = {"K": "degC"}
 """Usual unit in place of the SI unit; "C" alone is a coulomb."""
-LONGEST = 100
-"""Characters of a value that a message shows."""
 
 
 @functools.cache
@@ -87,20 +87,6 @@ def _convert(number: float, given: str, unit: str) -> float:
 def _base_units(unit: Any) -> set[str]:
     """Names of the base units of a unit, those without a dimension, such as the radian, among them."""
     return set(_registry().Quantity(1.0, unit).to_root_units().units._units)
-
-
-def printable(text: str) -> str:
-    """`text` for a message: on one line, shortened, without control characters."""
-    line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text[: LONGEST + 1])
-    return line if len(text) <= LONGEST else f"{line[:LONGEST]}..."
-
-
-def shown(value: Any) -> str:
-    """Any value for a message."""
-    try:
-        return printable(repr(value))
-    except (RecursionError, ValueError):  # nested a thousand times, or of thousands of digits
-        return f"a very large {type(value).__name__}"
 
 
 # --- speeds ---------------------------------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import reprlib
 from collections.abc import Mapping, Sequence
 from typing import Any, overload
 
@@ -11,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._arguments import require_at_least, wrong
-from .._errors import ArgumentError
+from .._errors import ArgumentError, shown
 from ..models import AbstractForcedSystem, require_speeds
 from ..solve import Lanes
 
@@ -33,7 +32,7 @@ def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> 
     """
     for name, value in {"first": first, **({} if last is None else {"last": last})}.items():
         if wrong(float, value) or not math.isfinite(value):
-            raise ArgumentError(name, said=f"must be a finite number, but {reprlib.repr(value)} was given.")
+            raise ArgumentError(name, said=f"must be a finite number, but {shown(value)} was given.")
     if said := wrong(int, count):
         raise ArgumentError("count", said=f"must be {said}, but {count!r} was given.")
     require_at_least(1, count=count)
