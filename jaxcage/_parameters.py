@@ -17,16 +17,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, PyTree
 
-from ._allowed import (
-    ROUNDING as ROUNDING,
-    SOURCES as SOURCES,
-    UNKNOWN as UNKNOWN,
-    Kind as Kind,
-    ParameterInfo as ParameterInfo,
-    allowed as allowed,
-    must_be_given as must_be_given,
-    within as within,
-)
+from ._allowed import SOURCES, UNKNOWN, Kind, ParameterInfo, allowed, must_be_given, within
 from ._errors import ArgumentError, InputError, parameters_like, shown
 
 
@@ -45,22 +36,31 @@ def _as_leaf(x: Any) -> Any:
 _NO_NUMBERS = (str, bytes, bool, complex, list, tuple, dict, set, np.ma.MaskedArray)
 
 
-def _leaf_of(info: "ParameterInfo", x: Any) -> Any:
-    """Convert the value of a declared parameter. **Raises:** `ValueError` unless it is real, a number or an array,
-    and within its range; traced ones pass."""
-    if isinstance(x, _NO_NUMBERS) or (isinstance(x, np.ndarray | np.generic) and x.dtype.kind not in "iuf"):
-        raise InputError(f"The {info.text} {allowed(info)}, but {shown(x)} was given.")
-    if (wrong := _out_of_range(x, info)) is not None:
-        raise InputError(f"The {info.text} {allowed(info)}, but {wrong:g} was given.")
+def _leaf_of(info: ParameterInfo, x: Any) -> Any:
+    """Convert the value of a declared parameter. **Raises:** as `require_range`."""
+    if said := _wrong(x, info):
+        raise InputError(f"The {info.text} {said}")
     return _as_leaf(x)
 
 
-def _out_of_range(x: Any, info: "ParameterInfo") -> float | None:
-    """First number of `x` out of the range of a parameter, None if there is none or it is traced."""
+def require_range(name: str, value: Any, info: ParameterInfo) -> None:
+    """Require a number or an array within the range of a parameter; traced ones pass. **Raises:** `ValueError`."""
+    if said := _wrong(value, info):
+        raise ArgumentError(name, said=said)
+
+
+def _wrong(x: Any, info: ParameterInfo) -> str:
+    """Words about a value that a parameter must not have; empty for others, and for placeholders."""
+    if isinstance(x, _NO_NUMBERS) or (isinstance(x, np.ndarray | np.generic) and x.dtype.kind not in "iuf"):
+        return f"{allowed(info)}, but {shown(x)} was given."
     if isinstance(x, Tracer) or not isinstance(x, int | float | np.ndarray | np.generic | jax.Array):
-        return None
+        return ""
     numbers = np.asarray(x, dtype=float)
-    return next(iter(numbers[~within(numbers, info.lower, info.upper)].flat), None)
+    unit, out = (
+        "" if info.unit in ("1", UNKNOWN) else f" {info.unit}",
+        numbers[~within(numbers, info.lower, info.upper)],
+    )
+    return f"{allowed(info)}, but is {out.flat[0]:g}{unit}." if out.size else ""
 
 
 def parameter(
@@ -317,15 +317,6 @@ def _changed(module: Any, changes: Mapping[tuple[str, ...], Any]) -> Any:
         if check := vars(kind).get("__check_init__"):
             check(copy)
     return copy
-
-
-def require_range(name: str, value: Any, info: ParameterInfo) -> None:
-    """Require a value within its range; traced ones pass. **Raises:** `ValueError` otherwise."""
-    if isinstance(value, _NO_NUMBERS):
-        raise ArgumentError(name, said=f"{allowed(info)}, but {shown(value)} was given.")
-    if (wrong := _out_of_range(value, info)) is not None:
-        unit = "" if info.unit in ("1", UNKNOWN) else f" {info.unit}"
-        raise ArgumentError(name, said=f"{allowed(info)}, but is {wrong:g}{unit}.")
 
 
 Parameter = str | Callable[[Any], Any]

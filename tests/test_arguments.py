@@ -67,7 +67,7 @@ unwrap = inspect.unwrap
         (lambda: jc.replace(CASE, guidance_gap=0.5), "`guidance_gap` must be a number from 1e-05 to 0.005 m"),
         (lambda: jc.replace(CASE, cage_mass=math.nan), "`cage_mass` must be a number from 0.001 to 100 kg"),
         (lambda: jc.bearing.Material("brass", 1e11), "must be a number from .* but 'brass' was given"),
-        (lambda: jc.bearing.Material(7800.0, -1.0), "must be a number from .* but -1 was given"),
+        (lambda: jc.bearing.Material(7800.0, -1.0), "must be a number from .* but is -1 Pa"),
         (lambda: jc.ForcedOscillator(3, coordinates=1), "`acceleration` must be something that can be called, but 3"),
         (lambda: jc.ForcedSystem(DUFFING.acceleration, 2.5), "`dimension` must be a whole number"),
     ],

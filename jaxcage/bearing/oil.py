@@ -12,9 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from .._allowed import ROUNDING
 from .._arguments import is_concrete
 from .._errors import ArgumentError, shown
-from .._parameters import ROUNDING, parameter
+from .._parameters import parameter
 from .._pytrees import Scalar
 
 

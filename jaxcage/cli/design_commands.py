@@ -126,8 +126,7 @@ def _calm_design(
     that a balance grade replaces."""
     model, name = subject.model, subject.name
     subject, (low, high) = subject.operating(calm.operating)
-    film = None if calm.least_film is None else jc.files.to_si(calm.least_film, "m")
-    keep = jc.Requirements(calm.margin, calm.decay, film, calm.land_force, calm.grade, calm.drag)
+    keep = jc.Requirements(calm.margin, calm.decay, calm.least_film, calm.land_force, calm.grade, calm.drag)
     tolerance = read_tolerances(calm.tolerance or "", subject, high)
     graded = {n for n, each in tolerance.items() if each.absolute} if usual else set()
     bounds, notes = {n: ends for n, ends in bounds.items() if n not in graded}, [] if graded else notes

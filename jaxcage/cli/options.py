@@ -24,7 +24,7 @@ LARGEST = {"rpm": 1e6, "N": 1e7}
 """Largest speed and load."""
 SIDE = range(2, 10_001)
 """Allowed numbers of points along one side of a map."""
-EXAMPLES = {"rpm": '"900 rad/s" or "20000 rpm shaft"', "N": '"4.45 kN"'}
+EXAMPLES = {"rpm": '"900 rad/s" or "20000 rpm shaft"', "N": '"4.45 kN"', "m": '"20 um"'}
 TO = re.compile(r"\s*(?:-|–|\.\.|\bto\b)\s*")
 """Separates the ends of a range of speed."""
 
@@ -252,7 +252,7 @@ class CalmOptions:
     """Least distance of both ends of the range from the edges of the stable range, per cent of speed."""
     decay: Annotated[float | None, _NUMBER] = None
     """Largest number of revolutions in which a small disturbance falls to 1/e."""
-    least_film: OptionalText = None
+    least_film: Annotated[float | None, number("be at least 0 m", lambda x: x >= 0, "m")] = None
     """Least distance of cage and land, e.g. "20 um"."""
     land_force: Annotated[float | None, _NUMBER] = None
     """Largest force of the land on the cage in calm motion [N]; 0 forbids contact."""

@@ -13,8 +13,9 @@ from matplotlib.colors import LogNorm, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from .._allowed import within
 from .._errors import ArgumentError
-from .._parameters import parameter_info, parameters, within
+from .._parameters import parameter_info, parameters
 from ..analysis import failed
 from ..orbits import Curve, Point, curve
 from ..quantities import quantity
