@@ -78,9 +78,7 @@ def require_at_least(least: int, **numbers: Any) -> None:
 
 
 def options(annotation: Any) -> tuple[Any, ...]:
-    """Members of a union or of the bound of a type variable, or else the annotation itself."""
-    if isinstance(annotation, typing.TypeVar) and annotation.__bound__ is not None:
-        return options(annotation.__bound__)
+    """Members of a union, or else the annotation itself."""
     if typing.get_origin(annotation) in (typing.Union, types.UnionType):
         return tuple(one for member in typing.get_args(annotation) for one in options(member))
     return (annotation,)

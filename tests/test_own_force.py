@@ -179,7 +179,7 @@ def test_what_is_not_honoured_is_refused():
             jc.replace(CASE, extra=wrong)
     with pytest.raises(ValueError, match="`Shaker` must repeat after one revolution"):
         with_extra(Shaker(1.0, times=1.5))  # pyright: ignore[reportArgumentType]
-    with pytest.raises(ValueError, match="The drag of the cage's centre must be a number from 0 to 1000 N s/m, but -1"):
+    with pytest.raises(ValueError, match="cage's centre must be a number from 0 to 1000 N s/m, but is -1 N s/m"):
         ViscousDrag(-1.0, arm=0.0)
     with pytest.raises(ValueError, match="with powers as in `N s.2/m.2`, but 'N s2/m2' was given"):
         parameter("N s2/m2", 0.0, 1.0, "quadratic drag")
