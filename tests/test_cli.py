@@ -50,6 +50,7 @@ REFUSED = [
     ("statics 1a --load heavy", '"heavy"'),
     ("statics 1a --speed 6e4 --load 1e-10", "--load and --speed"),
     ("runup 1a --rate 1e6", "--rate"),
+    ("runup 1a --rate 1e-9", "--rate must leave two revolutions for each of 100 windows, and at most 10000000 in all"),
     ("map 1a --y gap", "--y must be a parameter (did you mean guidance_gap?), but 'gap' was given"),
     ("map 1a --lower 0.4kg", "--lower"),
     ("map 1a --lower 0.5mm", "guidance_gap = 0.00045 m between them"),
@@ -59,6 +60,7 @@ REFUSED = [
     ("study 1a --vary speed=140Hz", "is in Hz"),
     (f"{STUDY} --vary gap=0.4mm", "'gap'"),
     (f"{STUDY} --vary speed=3000", "speed was given twice"),
+    (f"{STUDY} --vary oil=1", "Option --vary viscosity_1 and viscosity_2 must not rise"),
     (f"{STUDY} --vary eccentricity=0.5mm", "must be smaller than"),
     (f"{GAP}=0.4kg", 'guidance_gap has the unit "kg"'),
     (f"{GAP}=0.4mm:0.5mm:many", "'many'"),
@@ -83,6 +85,7 @@ REFUSED = [
     # Whole bearings.
     ("bifurcations nu2310", "takes a cage"),
     ("sweep nu2310 --exponents 2", "--exponents must be at most 1"),
+    ("sweep nu2310 --horizon 5", "Option --horizon must be left out for a model whose revolutions do not repeat"),
     ("runup nu2310 --last 200000", "300 m/s at its land"),
     ("compare nu2310 1a", "must be a bearing with its rollers"),
     ("gradient nu2310", "--speed must be given"),

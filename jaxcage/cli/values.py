@@ -160,5 +160,6 @@ def _check_corners(vary: dict[str, Any], subject: Subject) -> None:
             oil = {OIL: corner.pop(OIL)} if OIL in corner else {}
             jc.files.check_together(jc.replace(jc.lanes.with_values(subject.model, oil), **corner))
         except ValueError as error:
-            said = error.about("Option --vary", str) if isinstance(error, ArgumentError) else f"Option --vary: {error}"
-            raise InputError(said) from error
+            named = isinstance(error, ArgumentError)
+            said = f" {' and '.join(error.names)} {error.said}" if named else f": {error}"
+            raise InputError(f"Option --vary{said}") from error

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Bool, Float
 
+from .._arguments import MOST
 from .._errors import ArgumentError, NoResult
 from ..analysis import runs
 from ..models import AbstractForcedSystem
@@ -59,13 +60,11 @@ def ramp_up_down(
         raise ArgumentError("rate", said=f"must be positive and finite, but {rate:g} rad/s^2 was given.")
     revolutions = ramp_revolutions(model, first, last, (last - first) / rate)
     each = 2 * (revolutions // (2 * windows))
-    if each < 2:
-        slow = rate * revolutions / (2 * windows)
-        raise ArgumentError(
-            "rate",
-            said=f"must leave two revolutions for each of {windows} windows, but {rate * 30 / math.pi:.4g} rpm/s make "
-            f"{revolutions} in all: choose at most {slow * 30 / math.pi:.3g} rpm/s.",
-        )
+    if each < 2 or revolutions > MOST:
+        end, limit = ("most", 2 * windows) if each < 2 else ("least", MOST)
+        said = f"must leave two revolutions for each of {windows} windows, and at most {MOST} in all, but "
+        said += f"{rate * 30 / math.pi:.4g} rpm/s make {revolutions}: choose at {end} "
+        raise ArgumentError("rate", said=f"{said}{rate * revolutions / limit * 30 / math.pi:.3g} rpm/s.")
     windows = round(revolutions / each)
     revolutions = each * windows
     options = {"revolutions": revolutions, "samples": SAMPLES, "method": method}

@@ -80,10 +80,9 @@ class Run:
             raise ArgumentError("settled", said=f"must be 0, or {allowed}, but is {self.settled}.")
         if self.settled and (self.confirm or self.horizon):
             raise ArgumentError("settled", said="goes with `confirm=False` and `horizon=0`, but one of them was given.")
-        if model.samples > 1 and (self.confirm or self.horizon or self.settled):
-            raise ArgumentError(
-                "confirm", "horizon", "settled", said="must be left out for a model whose revolutions do not repeat."
-            )
+        repeats = [name for name in ("confirm", "horizon", "settled") if getattr(self, name)]
+        if model.samples > 1 and repeats:
+            raise ArgumentError(*repeats, said="must be left out for a model whose revolutions do not repeat.")
         if self.followed < self.blocks and self.horizon:
             said = f"must be 0 or above {self.revolutions - self.block} with a horizon, but is "
             raise ArgumentError("exponent_revolutions", said=f"{said}{self.exponent_revolutions}.")
