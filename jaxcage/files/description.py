@@ -190,22 +190,18 @@ def _checked(
     `made` need not be given."""
     declared = declarations()["modules"][module]
     fields, nested = declared["values"], declared["tables"]
-    _refuse_unknown(table, fields, nested, path)
-    ready_made = {
-        key: read(table[key]) for (where, key), read in _READY_MADE.items() if (where,) == path and key in table
-    }
-    started = started or bool(ready_made)
-    best = lambda value: value.best if isinstance(value, Range) else value
-    given = {name: _value(_dotted(path, name), table[name], fields[name]) for name in fields if name in table}
-    found = {name: best(value) for name, value in given.items()}
-    for where, names in _SHORTHANDS.items():
-        if where[:-1] == path and where[-1] in table:
-            value = _value(_dotted(path, where[-1]), table[where[-1]], fields[names[0]])
-            free = tuple(name for name in names if name not in found)
-            if isinstance(value, Range) and free:
-                ranges[where] = value, free
-            found = dict.fromkeys(names, best(value)) | found
-    ranges |= {(*path, name): (value, (name,)) for name, value in given.items() if isinstance(value, Range)}
+    ready_made = {key: read for (where, key), read in _READY_MADE.items() if (where,) == path}
+    sets = {where[-1]: names for where, names in _SHORTHANDS.items() if where[:-1] == path}
+    sets |= {name: (name,) for name in fields}
+    _refuse_unknown(table, [*ready_made, *fields, *sets], nested, path)
+    found = {key: read(table[key]) for key, read in ready_made.items() if key in table}
+    started = started or bool(found)
+    for key in (key for key in sets if key in table):
+        value = _value(_dotted(path, key), table[key], fields[sets[key][0]])
+        names = tuple(name for name in sets[key] if name == key or name not in table)
+        if isinstance(value, Range) and names:
+            ranges[(*path, key)] = value, names
+        found |= dict.fromkeys(names, value.best if isinstance(value, Range) else value)
     parts = {}
     for name in (name for name in nested if name in table):
         below, options = table[name], nested[name]
@@ -217,7 +213,7 @@ def _checked(
     if not started:
         found = clearances(found) | found if module == "Bearing" else found
         _require_whole(module, {*found, *parts, *made}, path)
-    return Part(module, ready_made | found, parts)
+    return Part(module, found, parts)
 
 
 def _kind(options: list[str], table: Mapping[str, Any], started: bool, path: tuple[str, ...]) -> str:
@@ -248,22 +244,19 @@ def _dotted(path: tuple[str, ...], name: str = "") -> str:
     return ".".join((*path, name) if name else path)
 
 
-def _refuse_unknown(
-    table: Mapping[str, Any], fields: Iterable[str], nested: Iterable[str], path: tuple[str, ...]
-) -> None:
-    keys = [*fields, *(where[-1] for where in _SHORTHANDS if where[:-1] == path)]
-    extra = [key for where, key in _READY_MADE if (where,) == path] if path else ["base", "model", "speeds", "material"]
+def _refuse_unknown(table: Mapping[str, Any], keys: list[str], nested: Iterable[str], path: tuple[str, ...]) -> None:
+    keys = [*([] if path else ["base", "model", "speeds", "material"]), *dict.fromkeys(keys)]
     for key in table:
-        if key in (*extra, *keys, *nested):
+        if key in (*keys, *nested):
             continue
         where = f" in [{_dotted(path)}]" if path else " at the top level"
         for subject, about in declarations()["subjects"].items():
             other = declarations()["modules"][about["module"]]
             if not path and (key in other["values"] or key in other["tables"]):
                 raise ConfigError(f'Key `{key}`{where} needs model = "{subject}".')
-        if like := difflib.get_close_matches(key[:100], [*extra, *keys, *nested], 1):
+        if like := difflib.get_close_matches(key[:100], [*keys, *nested], 1):
             raise ConfigError(f"Key `{printable(key)}`{where} is unknown (did you mean `{like[0]}`?).")
-        offered = ", ".join([*extra, *keys, *(f"[{name}]" for name in nested)])
+        offered = ", ".join([*keys, *(f"[{name}]" for name in nested)])
         raise ConfigError(f"Key `{printable(key)}`{where} must be one of {offered}.")
 
 
