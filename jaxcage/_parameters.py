@@ -56,10 +56,8 @@ def _wrong(x: Any, info: ParameterInfo) -> str:
     if isinstance(x, Tracer) or not isinstance(x, int | float | np.ndarray | np.generic | jax.Array):
         return ""
     numbers = np.asarray(x, dtype=float)
-    unit, out = (
-        "" if info.unit in ("1", UNKNOWN) else f" {info.unit}",
-        numbers[~within(numbers, info.lower, info.upper)],
-    )
+    out = numbers[~within(numbers, info.lower, info.upper)]
+    unit = "" if info.unit in ("1", UNKNOWN) else f" {info.unit}"
     return f"{allowed(info)}, but is {out.flat[0]:g}{unit}." if out.size else ""
 
 
