@@ -26,13 +26,15 @@ import xarray as xr
 from jaxtyping import Float, Shaped
 
 from .._errors import InputError
+from .._parameters import parameter_info
 from ..analysis import LABELS, scatter
 from ..files import configuration, replacing
 from ..models import AbstractForcedSystem
 from ..quantities import averaged, quantity
 from ..solve import OUTCOMES, AbstractMethod
+from .grid import OIL
 from .observe import Observation
-from .plan import SPEED, Plan
+from .plan import SPEED, Coordinate, Plan
 from .settings import Run
 
 
@@ -86,7 +88,8 @@ def dataset(
     shaped = lambda x: x.reshape(*plan.shape, *x.shape[1:])
     words = lambda name: {"long_name": about[name].text, "units": about[name].unit}
     variables = {name: ((*plan.axes, *dims), shaped(x), words(name)) for name, (dims, x) in values.items()}
-    coordinates: dict[str, Any] = {"component": np.array(model.components, dtype=object), **_coordinates(plan)}
+    coordinates: dict[str, Any] = {"component": np.array(model.components, dtype=object)}
+    coordinates |= coordinates_of(model, plan.coordinates) | _other_speed(plan)
     if not model.beside:
         coordinates["revolution"] = np.arange(last - run.keep + 1, last + 1)
     attributes = {
@@ -101,21 +104,25 @@ def dataset(
     return xr.Dataset(variables, coordinates, attributes | ({} if plan.lanes.several else configuration_of(model)))
 
 
-def _coordinates(plan: Plan) -> dict[str, Any]:
-    """Values along the axes, speeds also in rpm, and the model's other speed (of the shaft or of the cage) in rpm."""
-    model = plan.model
-    found: dict[str, Any] = dict(plan.coordinates)
-    if SPEED not in found:
-        return found
+def coordinates_of(model: AbstractForcedSystem, given: Mapping[str, Coordinate]) -> dict[str, Any]:
+    """Coordinates with texts and units, and the speed also in rpm."""
+    info, (dims, speed) = parameter_info(model), given[SPEED]
+    known = {name: info.get(name) or quantity(name) for name in given}
+    about = {name: (each.text, each.unit) for name, each in known.items()}
+    about |= {SPEED: (model.speed_text, "rad/s"), "rpm": (model.speed_text, "rpm")}
+    about |= {OIL: ("ISO VG grade of the oil", "mm^2/s")}
+    values = {**given, "rpm": (dims, speed * 30 / np.pi)}
+    return {name: (*x, dict(zip(("long_name", "units"), about[name], strict=True))) for name, x in values.items()}
+
+
+def _other_speed(plan: Plan) -> dict[str, Any]:
+    """Coordinate with the other speed of a single model (of the shaft or of the cage) in rpm; empty without one."""
     dims, speed = plan.coordinates[SPEED]
-    words = lambda text, unit: {"long_name": text, "units": unit}
-    found[SPEED] = dims, speed, words(model.speed_text, "rad/s")
-    found["rpm"] = dims, speed * 30 / np.pi, words(model.speed_text, "rpm")
-    if dims == (SPEED,) and not plan.lanes.several and (other := model.other_speed(1.0)) is not None:
-        text = other[0]
-        values = np.array([float(model.other_speed(w)[1]) for w in speed])  # pyright: ignore
-        found[f"{text.split()[0]}_rpm"] = dims, values * 30 / np.pi, words(text, "rpm")
-    return found
+    others = [other for w in speed if (other := plan.model.other_speed(w)) is not None]
+    if dims != (SPEED,) or plan.lanes.several or not others:
+        return {}
+    rpm, text = np.array([float(other) for _, other in others]) * 30 / np.pi, others[0][0]
+    return {f"{text.split()[0]}_rpm": (dims, rpm, {"long_name": text, "units": "rpm"})}
 
 
 def configuration_of(model: AbstractForcedSystem) -> dict[str, str]:

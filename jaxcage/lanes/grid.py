@@ -23,7 +23,7 @@ from ..bearing import vg
 from ..files import Range
 from ..models import AbstractForcedSystem, require_speeds
 from ..solve import Lanes
-from .plan import SPEED, START, Plan, own_states
+from .plan import SPEED, START, Coordinate, Plan, own_states
 
 
 SAMPLE = "sample"
@@ -108,6 +108,12 @@ class Grid:
         places = sobol(len(self.sampled), self.samples, self.seed)
         return {name: spread.at(places[:, i]) for i, (name, spread) in enumerate(self.sampled.items())}
 
+    @property
+    def coordinates(self) -> dict[str, Coordinate]:
+        """Values [SI] along the axes of the grid, by parameter."""
+        along = {name: ((name,), np.asarray(x)) for name, x in self.values.items()}
+        return along | {name: ((SAMPLE,), x) for name, x in self.cloud.items()}
+
     @functools.cached_property
     def block(self) -> tuple[int, ...]:
         """Extent of a chunk along each axis: the fastest axes whole, the next in equal parts within `lanes`."""
@@ -176,7 +182,7 @@ class Grid:
         states = chosen.each(own_states, np.arange(some.size))[np.arange(some.size), start]
         if lanes is not None:
             return Plan(chosen, states, {"lane": some.size}, {SPEED: (("lane",), speed)})
-        return Plan(chosen, states, self.axes, {name: ((name,), np.asarray(x)) for name, x in self.values.items()})
+        return Plan(chosen, states, self.axes, self.coordinates)
 
     def describe(self) -> dict[str, Any]:
         """Description that determines the lanes, by which a store recognises its study."""

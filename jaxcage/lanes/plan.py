@@ -18,6 +18,8 @@ from ..solve import Lanes
 Speeds = float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"]
 States = int | Sequence[Any] | Float[np.ndarray, "speeds states dim"] | None
 """Initial states: number of the model's own (None for all), states used at every speed, or states for each speed."""
+Coordinate = tuple[tuple[str, ...], np.ndarray]
+"""Axes and values [SI] of a coordinate."""
 DESIGN, SPEED, START = "design", "speed", "initial_state"
 
 
@@ -51,8 +53,7 @@ class Plan:
     """Initial state of each lane [SI]."""
     axes: Mapping[str, int]
     """Length of each axis, slowest first; their product is the number of lanes."""
-    coordinates: Mapping[str, tuple[tuple[str, ...], np.ndarray]] = dataclasses.field(default_factory=dict)
-    """Axes and values [SI] of each coordinate."""
+    coordinates: Mapping[str, Coordinate]
 
     @property
     def model(self) -> AbstractForcedSystem:

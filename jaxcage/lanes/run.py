@@ -113,7 +113,7 @@ def _stored(store: Store, chunk: int, run: Callable[[], Observation]) -> Observa
     study = store.study
     if store.pending([chunk]):
         seen = run()
-        store.write(chunk, {name: x for name, x in seen._asdict().items() if name in study.variables})
+        store.write(chunk, {name: x for name, x in seen._asdict().items() if x.size})
         return seen
     blank = Observation.pending(study.model, study.run, study.grid.lanes_of(chunk).size)
     return blank._replace(**{n: x.astype(getattr(blank, n).dtype) for n, x in store.read(chunk).items()})

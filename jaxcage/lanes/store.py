@@ -15,7 +15,7 @@ import tempfile
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -23,15 +23,12 @@ import numpy as np
 import xarray as xr
 
 from .._errors import ArgumentError, InputError
-from .._parameters import parameter_info
+from ..analysis import scatter
 from ..files import sync
 from ..models import AbstractForcedSystem
-from ..quantities import quantity
-from ..solve import OUTCOMES
-from .dataset import CODES, configuration_of, decoded, flags, settings_of
-from .grid import OIL, SAMPLE, Grid
+from .dataset import CODES, coded, configuration_of, coordinates_of, dataset, decoded, flags, settings_of
+from .grid import Grid
 from .observe import Observation
-from .plan import SPEED
 from .settings import Run
 
 
@@ -41,19 +38,6 @@ Results = dict[str, np.ndarray]
 """Results of the lanes of a chunk by name."""
 
 
-class Variable(NamedTuple):
-    """A variable that is stored for every lane."""
-
-    text: str
-    unit: str
-    shape: tuple[int, ...] = ()
-    """Shape of the numbers of a lane; in a study, one for each exponent."""
-    names: tuple[str, ...] = ()
-    """Meanings of the codes 0, 1, ...; empty for numbers that are not codes."""
-
-
-SCALARS = ("peak", "error", "steps")
-"""Variables stored for every lane of any model."""
 KNOWN = "jaxcage jax jaxlib numpy diffrax equinox lineax optimistix builtins".split()
 """Packages whose code is identified by their versions."""
 OUTCOME = "outcome"
@@ -87,22 +71,26 @@ class Study:
         method = {"method_numbers": numbers_of(self.run.method), **settings_of(self.run.method)}
         return json.dumps({**about, "plan": self.grid.describe(), **run, **method}, sort_keys=True)
 
-    @property
-    def variables(self) -> dict[str, Variable]:
-        """Variables that are stored for every lane, by name."""
-        if self.observations:
-            blank = Observation.pending(self.model, self.run, 1)._asdict()
-            words = {"outcome": OUTCOMES}
-            return {n: Variable(n, "", x.shape[1:], words.get(n, ())) for n, x in blank.items() if x.size}
-        known, exponents = lambda name: (quantity(name).text, quantity(name).unit), (self.run.exponents,)
-        found = {name: Variable(*known(name)) for name in SCALARS}
-        if self.run.exponents:
-            found["exponents"] = Variable(*known("exponent"), exponents)
-            found["standard_error"] = Variable(*known("standard_error"), exponents)
-        for each in self.model.quantities:
-            found[each.name] = Variable(each.text, each.unit)
-            found[f"{each.name}_standard_error"] = Variable(f"standard error, {each.text}", each.unit)
-        return found | {name: Variable(*known(name), names=words) for name, words in CODES.items()}
+    def blank(self) -> xr.Dataset:
+        """Variables that are stored, for one lane that has not been run."""
+        seen = Observation.pending(self.model, self.run, 1)
+        if not self.observations:
+            plan = self.grid.plan(self.model, np.zeros(1, dtype=int))
+            return stored(dataset(plan, self.run, seen, plan.scale, np.array(["failed"])), self.model)
+        dims = lambda name, x: ("lane", *(f"{name}_{i}" for i in range(x.ndim - 1)))
+        words = lambda name: {"long_name": name, "units": "", **flags(CODES.get(name, ()))}
+        return xr.Dataset({n: (dims(n, x), x, words(n)) for n, x in seen._asdict().items() if x.size})
+
+
+def stored(found: xr.Dataset, model: AbstractForcedSystem) -> xr.Dataset:
+    """Variables of a run that a study stores, with standard errors in place of the values of each block."""
+    names = ["peak", "error", "steps", *(("exponents", "standard_error") if found.sizes["exponent"] else ())]
+    for each in model.quantities:
+        error = found[f"{each.name}_blocks"].reduce(scatter, "block")
+        error.attrs = {"long_name": f"standard error, {each.text}", "units": each.unit}
+        found = found.assign({f"{each.name}_standard_error": error})
+        names += [each.name, f"{each.name}_standard_error"]
+    return coded(found[[*names, *CODES]])
 
 
 class Store:
@@ -149,9 +137,9 @@ class Store:
 
     def read(self, chunk: int) -> Results:
         """Results of a finished chunk."""
-        region, lanes = self.study.grid.region(chunk), self.study.grid.lanes_of(chunk).size
-        shapes = {name: (lanes, *variable.shape) for name, variable in self.study.variables.items()}
-        return {name: self._arrays[name][region].reshape(shape) for name, shape in shapes.items()}
+        region, axes = self.study.grid.region(chunk), len(self.study.grid.axes)
+        whole = {name: x[region] for name, x in self._arrays.items() if x.ndim >= axes}  # without coordinates
+        return {name: x.reshape(-1, *x.shape[axes:]) for name, x in whole.items()}
 
     def tidy(self) -> None:
         """Remove temporary files of killed processes from a store to which nobody writes any more."""
@@ -303,46 +291,26 @@ def _write(path: Path, study: Study) -> None:
     import zarr
     from zarr.codecs import Crc32cCodec, ZstdCodec
 
-    plan, compressors = study.grid, (ZstdCodec(), Crc32cCodec())  # any reader of zarr verifies the checksums
-    coordinates = _coordinates(study)
-    dataset = xr.Dataset(coords=coordinates, attrs=_attributes(study))
-    checked = {name: {"compressors": compressors} for name in coordinates}
-    dataset.to_zarr(path, mode="w", consolidated=False, encoding=checked)
+    grid, compressors = study.grid, (ZstdCodec(), Crc32cCodec())  # any reader of zarr verifies the checksums
+    axes = coordinates_of(study.model, grid.coordinates) | {"exponent": np.arange(1, study.run.exponents + 1)}
+    checked = {name: {"compressors": compressors} for name in axes}
+    xr.Dataset(coords=axes, attrs=_attributes(study)).to_zarr(path, mode="w", consolidated=False, encoding=checked)
     group = zarr.open_group(path, mode="r+", zarr_format=3, use_consolidated=False)
-    for name, variable in study.variables.items():
-        extra = variable.shape
-        axes = [f"{name}_{i}" for i in range(len(extra))] if study.observations else ["exponent"] * len(extra)
+    for name, variable in study.blank().items():
+        codes, extra = "flag_values" in variable.attrs, variable.shape[1:]
         group.create_array(
-            name,
-            shape=(*plan.shape, *extra),
-            chunks=(*plan.block, *extra),
-            dtype="int8" if variable.names else "float64",
-            fill_value=-1 if variable.names else np.nan,
+            str(name),
+            shape=(*grid.shape, *extra),
+            chunks=(*grid.block, *extra),
+            dtype="int8" if codes else "float64",
+            fill_value=-1 if codes else np.nan,
             compressors=compressors,
-            dimension_names=(*plan.axes, *axes),
-            attributes={"long_name": variable.text, "units": variable.unit, **flags(variable.names)},
+            dimension_names=(*grid.axes, *variable.dims[1:]),
+            attributes=variable.attrs,
         )
     with warnings.catch_warnings():  # zarr warns that this is not in the specification yet; xarray warns without it
         warnings.simplefilter("ignore")
         zarr.consolidate_metadata(path)
-
-
-def _coordinates(study: Study) -> dict[str, Any]:
-    grid, info = study.grid, parameter_info(study.model)
-
-    def words(name: str) -> dict[str, str]:
-        if name == OIL:
-            return {"long_name": "ISO VG grade of the oil", "units": "mm^2/s"}
-        if name == SPEED:
-            return {"long_name": study.model.speed_text, "units": "rad/s"}
-        known = info.get(name) or quantity(name)
-        return {"long_name": known.text, "units": known.unit}
-
-    found: dict[str, Any] = {name: (name, np.asarray(x), words(name)) for name, x in grid.values.items()}
-    found |= {name: (SAMPLE, x, words(name)) for name, x in grid.cloud.items()}
-    dims, speed, about = found[SPEED]
-    exponents = np.arange(1, study.run.exponents + 1)
-    return found | {"rpm": (dims, speed * 30 / np.pi, about | {"units": "rpm"}), "exponent": exponents}
 
 
 def _attributes(study: Study) -> dict[str, Any]:

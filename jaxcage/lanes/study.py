@@ -14,15 +14,14 @@ from jaxtyping import Array, Float
 
 from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError, Stop
-from ..analysis import LONGEST_PERIOD, scatter
+from ..analysis import LONGEST_PERIOD
 from ..files import Range
 from ..models import AbstractForcedSystem
-from .dataset import coded
 from .grid import LANES, Grid
 from .observe import Progress
 from .run import run_lanes
 from .settings import Run
-from .store import Results, Store, Study, open_study
+from .store import Results, Store, Study, open_study, stored
 
 
 CLOSING = 2 * LONGEST_PERIOD
@@ -91,13 +90,11 @@ def study(
 
 def _chunk(about: Study, number: int, progress: Progress) -> Results:
     """Compute the results of a chunk; a lane's bits do not depend on the chunk."""
-    lanes, model = about.grid.lanes_of(number), about.model
-    found = coded(run_lanes(about.grid.plan(model, lanes), about.run, progress))
+    lanes = about.grid.lanes_of(number)
+    found = run_lanes(about.grid.plan(about.model, lanes), about.run, progress)
     if found.sizes["lane"] < lanes.size:
         raise Stop
-    values = {name: x.values for name, x in found.data_vars.items()}
-    values |= {f"{x.name}_standard_error": scatter(values[f"{x.name}_blocks"]) for x in model.quantities}
-    return {name: values[name] for name in about.variables}
+    return {str(name): x.values for name, x in stored(found, about.model).items()}
 
 
 def run_study(about: Study, path: str | Path, shard: Shard = (1, 1), progress: Progress | None = None) -> None:
