@@ -66,7 +66,7 @@ def follow(
             run, discard=0, revolutions=LIFE_BLOCK * (last - first), blocks=last - first, keep=keep, exponents=1
         )
         new = onward(stage, active, seen.last[active])
-        _put(seen, active, new, undecided[active])
+        _go_on(seen, active, new, undecided[active])
         late[active, first:last], ran[active] = new.growth[:, :, 0], last
         end = late[active, :last]
         calm[active] = calm_at_the_end(new.strobe, scale[active], end, LIFE_BLOCK)
@@ -93,14 +93,15 @@ def _aligned(late: Float[np.ndarray, "lanes ran"], count: int) -> Float[np.ndarr
     return blocks[:, blocks.shape[1] - size * count :].reshape(len(late), count, size).mean(axis=2)
 
 
-def _put(
-    seen: Observation, lanes: Int[np.ndarray, " some"], new: Observation, open_: Bool[np.ndarray, " some"]
+def _go_on(
+    seen: Observation, lanes: Int[np.ndarray, " some"], new: Observation, shown: Bool[np.ndarray, " some"]
 ) -> None:
-    """Update `seen` by later states, with NaN where a lane fails, and by strobe states for lanes that are `open_`."""
+    """Update `seen` by a later part of the run of some lanes, with NaN where it fails, and with its strobe states for
+    lanes that are `shown`."""
     seen.last[lanes], seen.outcome[lanes] = new.last, new.outcome
     seen.error[lanes] = np.fmax(seen.error[lanes], new.error)
-    every = np.concatenate([seen.strobe[lanes[open_]], new.strobe[open_]], axis=1)
-    seen.strobe[lanes[open_]] = every[:, new.strobe.shape[1] :]
+    every = np.concatenate([seen.strobe[lanes[shown]], new.strobe[shown]], axis=1)
+    seen.strobe[lanes[shown]] = every[:, new.strobe.shape[1] :]
     lost = lanes[new.outcome != 0]
     seen.strobe[lost] = seen.growth[lost] = np.nan
 
@@ -112,10 +113,10 @@ def _coarse(growth: Float[np.ndarray, "lanes blocks"], block: int) -> Float[np.n
     return every[:, every.shape[1] - count * LIFE_BLOCK :].reshape(len(growth), count, LIFE_BLOCK).mean(axis=2)
 
 
-def run_unsettled(run: Run, scale: Float[np.ndarray, "lanes dim"], onward: Onward) -> Observation:
-    """Observe lanes, but stop those that are periodic after `run.settled` revolutions, or after all that are discarded,
-    before tangent vectors are followed: their exponents are NaN."""
-    lanes, seen, done = np.arange(len(scale)), None, 0
+def run_unsettled(seen: Observation, run: Run, scale: Float[np.ndarray, "lanes dim"], onward: Onward) -> Observation:
+    """Observe pending lanes, but stop those that are periodic after `run.settled` revolutions, or after all that are
+    discarded, before tangent vectors are followed: their exponents are NaN."""
+    lanes, done = np.arange(len(scale)), 0
     for until in sorted({run.settled, run.discard}):
         if not lanes.size:
             break
@@ -123,24 +124,13 @@ def run_unsettled(run: Run, scale: Float[np.ndarray, "lanes dim"], onward: Onwar
         look = dataclasses.replace(
             run, discard=until - done - short, revolutions=short, blocks=1, keep=short, exponents=0
         )
-        new = onward(look, lanes, None if seen is None else seen.last[lanes])
-        nan = lambda *shape, count=lanes.size: np.full((count, *shape), np.nan)
-        closed, strobe = closing_period(new.strobe, scale[lanes]) > 0, nan(run.keep, scale.shape[1])
-        strobe[:, run.keep - short :] = new.strobe
-        nothing = {"growth": nan(run.followed, run.exponents), "doubt": nan(run.exponents)}
-        new = new._replace(strobe=strobe, integrals=nan(run.blocks, 0), largest=nan(run.blocks, 0), **nothing)
-        if seen is None:
-            seen = new
-        else:
-            _later(seen, lanes, new)
+        new = onward(look, lanes, seen.last[lanes] if done else None)
+        _go_on(seen, lanes, new, np.ones(lanes.size, dtype=bool))
+        seen.peak[lanes], seen.steps[lanes] = new.peak, new.steps
+        closed = closing_period(new.strobe, scale[lanes]) > 0
         lanes, done = lanes[~closed & (new.outcome == 0)], until
-    assert seen is not None
     if lanes.size:
         align = min(run.block, run.discard) if run.exponents else 0
-        _later(seen, lanes, onward(dataclasses.replace(run, discard=align), lanes, seen.last[lanes]))
+        new = onward(dataclasses.replace(run, discard=align), lanes, seen.last[lanes])
+        seen.put(lanes, new._replace(error=np.fmax(seen.error[lanes], new.error)))
     return seen
-
-
-def _later(seen: Observation, lanes: np.ndarray, new: Observation) -> None:
-    """Replace the results of some lanes by later ones; the error is the larger one of both."""
-    seen.put(lanes, new._replace(error=np.fmax(seen.error[lanes], new.error)))

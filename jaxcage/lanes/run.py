@@ -73,7 +73,9 @@ def run_lanes(plan: Plan, run: Run, progress: Progress | None = None, store: Sto
         told = lambda part, of: progress and progress(done + part * some.size // of, count)
         told(0, 1)
         first = lambda run, few, y: onward(run, some[few], y, told)
-        return run_unsettled(run, scale[some], first) if run.settled else first(run, np.arange(some.size), None)
+        if run.settled:
+            return run_unsettled(seen.at(some), run, scale[some], first)
+        return first(run, np.arange(some.size), None)
 
     def again(lanes: np.ndarray, times: int) -> Labelled:
         seen.put(lanes, onward(run, lanes, None, method=run.method.finer(times)))
