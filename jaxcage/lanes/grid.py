@@ -7,6 +7,7 @@ its index, so that any process can compute any chunk at any time with identical 
 import dataclasses
 import functools
 import hashlib
+import itertools
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -124,25 +125,15 @@ class Grid:
             room //= length
         return tuple(reversed(extents))
 
-    @property
-    def blocks(self) -> tuple[int, ...]:
-        """Number of chunks along each axis."""
-        return tuple(-(-length // extent) for length, extent in zip(self.shape, self.block, strict=True))
-
-    @property
-    def chunks(self) -> int:
-        """Number of chunks."""
-        return math.prod(self.blocks)
-
-    def region(self, chunk: int) -> tuple[slice, ...]:
-        """Slices of the grid that a chunk covers."""
-        place = np.unravel_index(chunk, self.blocks)
-        corners = zip(place, self.block, self.shape, strict=True)
-        return tuple(slice(int(i) * extent, min((int(i) + 1) * extent, length)) for i, extent, length in corners)
+    @functools.cached_property
+    def chunks(self) -> list[tuple[slice, ...]]:
+        """Slices of the grid that each chunk covers."""
+        cuts = lambda length, extent: [slice(i, min(i + extent, length)) for i in range(0, length, extent)]
+        return list(itertools.product(*map(cuts, self.shape, self.block)))
 
     def lanes_of(self, chunk: int) -> Int[np.ndarray, " lanes"]:
         """Indices of the lanes of a chunk in the ravelled grid."""
-        within = np.ix_(*(np.arange(part.start, part.stop) for part in self.region(chunk)))
+        within = np.ix_(*(np.arange(part.start, part.stop) for part in self.chunks[chunk]))
         return np.ravel_multi_index(within, self.shape).ravel()
 
     def at(self, lane: Int[np.ndarray, " lanes"]) -> tuple[Values, Int[np.ndarray, " lanes"]]:

@@ -7,6 +7,7 @@ chaotic transient may end in one run and not in the other; such a change is not 
 the life of transients).
 """
 
+import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -83,14 +84,12 @@ def run_lanes(plan: Plan, run: Run, progress: Progress | None = None, store: Sto
 
     try:
         size = max(-(-count // PARTS), WIDTH * cores())
-        chunks = range(0, count, size) if store is None else range(store.study.grid.chunks)
-        for chunk in chunks:
-            if store is None:
-                some = np.arange(chunk, min(chunk + chunks.step, count))
-                seen.put(some, begun(some))
-            else:
-                some = store.study.grid.lanes_of(chunk)
-                seen.put(some, _stored(store, chunk, lambda some=some: begun(some)))
+        parts = np.split(np.arange(count), range(size, count, size))
+        if store is not None:
+            parts = [store.study.grid.lanes_of(chunk) for chunk in range(len(store.study.grid.chunks))]
+        for chunk, some in enumerate(parts):
+            first = functools.partial(begun, some)
+            seen.put(some, first() if store is None else _stored(store, chunk, seen.at(some), first))
             done += some.size
         finished = Observation(*map(np.copy, seen))
         if not several and run.exponents and run.blocks > 1:  # without an error of the exponent nothing is chaotic
@@ -110,15 +109,13 @@ def run_lanes(plan: Plan, run: Run, progress: Progress | None = None, store: Sto
     return found if whole == plan.shape[0] else found.isel({next(iter(plan.axes)): slice(whole)})
 
 
-def _stored(store: Store, chunk: int, run: Callable[[], Observation]) -> Observation:
+def _stored(store: Store, chunk: int, pending: Observation, run: Callable[[], Observation]) -> Observation:
     """Observation of a chunk of lanes, from the store or, if it is not there, from a run that is then stored."""
-    study = store.study
     if store.pending([chunk]):
         seen = run()
         store.write(chunk, {name: x for name, x in seen._asdict().items() if x.size})
         return seen
-    blank = Observation.pending(study.model, study.run, study.grid.lanes_of(chunk).size)
-    return blank._replace(**{n: x.astype(getattr(blank, n).dtype) for n, x in store.read(chunk).items()})
+    return pending._replace(**{n: x.astype(getattr(pending, n).dtype) for n, x in store.read(chunk).items()})
 
 
 def _motions(seen: Observation, samples: int) -> Shaped[np.ndarray, " lanes"]:

@@ -115,7 +115,7 @@ class Store:
 
     def pending(self, among: Iterable[int] | None = None) -> list[int]:
         """Chunks that are not finished, or that disagree with their checksums."""
-        chunks = range(self.study.grid.chunks) if among is None else among
+        chunks = range(len(self.study.grid.chunks)) if among is None else among
         unknown = [chunk for chunk in chunks if chunk not in self._finished]
         self._finished |= {chunk for chunk in unknown if _is_finished(self.path, self._arrays, chunk)}
         return [chunk for chunk in unknown if chunk not in self._finished]
@@ -130,14 +130,14 @@ class Store:
         self._finished.add(chunk)
 
     def _put(self, chunk: int, results: Results) -> None:
-        region = self.study.grid.region(chunk)
+        region = self.study.grid.chunks[chunk]
         shape = tuple(part.stop - part.start for part in region)
         for name in sorted(results, key=lambda name: name == OUTCOME):
             self._arrays[name][region] = results[name].reshape(*shape, *results[name].shape[1:])
 
     def read(self, chunk: int) -> Results:
         """Results of a finished chunk."""
-        region, axes = self.study.grid.region(chunk), len(self.study.grid.axes)
+        region, axes = self.study.grid.chunks[chunk], len(self.study.grid.axes)
         whole = {name: x[region] for name, x in self._arrays.items() if x.ndim >= axes}  # without coordinates
         return {name: x.reshape(-1, *x.shape[axes:]) for name, x in whole.items()}
 

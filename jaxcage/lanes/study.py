@@ -103,7 +103,7 @@ def run_study(about: Study, path: str | Path, shard: Shard = (1, 1), progress: P
     if not 1 <= i <= n:
         raise ArgumentError("shard", said=f"must be (i, n) with i from 1 to n, but ({i}, {n}) was given.")
     store = Store(path, about)
-    part = range(about.grid.chunks)[i - 1 :: n]
+    part = range(len(about.grid.chunks))[i - 1 :: n]
     pending, report = store.pending(part), progress or (lambda done, total: None)
     lanes = lambda chunks: sum(about.grid.lanes_of(chunk).size for chunk in chunks)
     total, left = lanes(part), lanes(pending)
