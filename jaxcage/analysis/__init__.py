@@ -35,7 +35,6 @@ from .measures import (
     measures as measures,
 )
 from .rollers import (
-    Around as Around,
     RollerHistory as RollerHistory,
     around as around,
     bearing_spectra as bearing_spectra,

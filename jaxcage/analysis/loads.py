@@ -15,7 +15,7 @@ from jaxtyping import Array, Bool, Complex, Float
 
 from ..models import CageModel
 from ..solve import REVOLUTION, AbstractMethod, Lanes, histories, native
-from .spectra import OrderSpectrum, dominant_orders
+from .spectra import dominant_orders, spectrum_of
 
 
 FILM = "least film"
@@ -98,13 +98,8 @@ def motions(
 
 
 def _order(path: Complex[np.ndarray, " samples"]) -> float:
-    """Order of the largest spectral line, with a Hann window."""
+    """Order of the largest spectral line; NaN for a centre at rest."""
     if not np.all(np.isfinite(path)) or np.max(np.abs(path - path[0])) == 0:
         return float("nan")
-    n = path.size
-    weights = np.hanning(n + 1)[:-1]
-    weights /= weights.sum()
-    lines = np.abs(np.fft.fftshift(np.fft.fft(weights * (path - weights @ path))))
-    order = np.fft.fftshift(np.fft.fftfreq(n, 1 / MOTION_SAMPLES))
-    peaks = dominant_orders(OrderSpectrum(order, lines), 1)
+    peaks = dominant_orders(spectrum_of(path, MOTION_SAMPLES), 1)
     return peaks[0].order if peaks else float("nan")

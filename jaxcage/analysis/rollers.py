@@ -1,10 +1,9 @@
 """Rollers of a whole bearing along a time history: slips, loads and forces around the bearing; lines of spectra."""
 
-import dataclasses
 from collections.abc import Mapping
 
 import numpy as np
-from jaxtyping import Float
+import xarray as xr
 
 from .._errors import ArgumentError
 from ..models import RollerHistory
@@ -19,55 +18,33 @@ LINES = 5
 """Number of lines of a spectrum that are named."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Around:
-    """Means over time in each part of the circumference; NaN where there was no roller."""
+def around(history: RollerHistory) -> xr.Dataset:
+    """Slips, loads and pocket forces around the circumference: means over time and rollers, NaN where there was none.
 
-    angle: Float[np.ndarray, " bins"]
-    """Middle of each part of the circumference, counter-clockwise from the x axis, 0 to 2 pi; the load points to
-    3 pi/2."""
-    roller_slip: Float[np.ndarray, " bins"]
-    inner_sliding: Float[np.ndarray, " bins"]
-    """Mean sliding speed at the inner ring [m/s]."""
-    inner_load: Float[np.ndarray, " bins"]
-    """Mean load between a roller and the inner ring [N]."""
-    driving_force: Float[np.ndarray, " bins"]
-    """Mean pocket force by which a roller drives the cage, counted as zero without contact [N]."""
-    braking_force: Float[np.ndarray, " bins"]
-    """Mean pocket force by which a roller brakes the cage, counted as zero without contact [N]."""
-
-
-def around(history: RollerHistory) -> Around:
-    """Slips, loads and pocket forces around the circumference, averaged over all rollers."""
-    bins = PARTS
-    where = np.floor(np.mod(history.roller_angle, 2 * np.pi) * bins / (2 * np.pi)).astype(int) % bins
+    **Returns:** over `angle`, the middle of each part counter-clockwise from the x axis, 0 to 2 pi (the load points to
+    3 pi/2): `roller_slip`; `inner_sliding`, speed at the inner ring [m/s]; `inner_load` between a roller and that ring
+    [N]; `driving_force` and `braking_force` of rollers that drive or brake the cage, zero without contact [N].
+    """
+    where = np.floor(np.mod(history.roller_angle, 2 * np.pi) * PARTS / (2 * np.pi)).astype(int) % PARTS
     weight = np.broadcast_to(np.gradient(history.time)[:, None], where.shape)
-    total = np.bincount(where.ravel(), weight.ravel(), bins)
+    force = np.sign(history.angle[-1] - history.angle[0]) * history.pocket_force
+    each = {name: getattr(history, name) for name in ("roller_slip", "inner_sliding", "inner_load")}
+    each |= {"driving_force": np.maximum(force, 0.0), "braking_force": np.maximum(-force, 0.0)}
+    total = lambda x: np.bincount(where.ravel(), x.ravel(), PARTS)
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean = lambda x: np.bincount(where.ravel(), (weight * x).ravel(), bins) / total
-        force = np.sign(history.angle[-1] - history.angle[0]) * history.pocket_force
-        return Around(
-            angle=(np.arange(bins) + 0.5) * 2 * np.pi / bins,
-            roller_slip=mean(history.roller_slip),
-            inner_sliding=mean(history.inner_sliding),
-            inner_load=mean(history.inner_load),
-            driving_force=mean(np.maximum(force, 0.0)),
-            braking_force=mean(np.maximum(-force, 0.0)),
-        )
+        means = {name: ("angle", total(weight * x) / total(weight)) for name, x in each.items()}
+    return xr.Dataset(means, {"angle": (np.arange(PARTS) + 0.5) * 2 * np.pi / PARTS})
 
 
 def pocket_force_distribution(history: RollerHistory) -> dict[str, float]:
     """Fraction of the time in which a pocket is in contact, and quantiles of the force [N] over that time."""
     force = np.abs(history.pocket_force)
     weight = np.broadcast_to(np.gradient(history.time)[:, None], force.shape)
-    touching = force > 0
+    touching, levels = force > 0, np.zeros(len(SHARES))
+    if touching.any():
+        levels = np.quantile(force[touching], SHARES, weights=weight[touching], method="inverted_cdf")
     found = {"contact_share": float(weight[touching].sum() / weight.sum())}
-    order = np.argsort(force[touching])
-    sorted_force, below = force[touching][order], np.cumsum(weight[touching][order])
-    for share in SHARES:
-        i = np.searchsorted(below, share * below[-1]) if below.size else 0
-        found[f"q{100 * share:g}"] = float(sorted_force[min(i, below.size - 1)]) if below.size else 0.0
-    return found
+    return found | {f"q{100 * share:g}": float(level) for share, level in zip(SHARES, levels, strict=True)}
 
 
 def bearing_spectra(history: RollerHistory) -> dict[str, OrderSpectrum]:

@@ -7,7 +7,7 @@ import dataclasses
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Inexact
 
 
 class Peak(NamedTuple):
@@ -38,8 +38,9 @@ class OrderSpectrum:
         return float(self.amplitude[np.argmin(np.abs(self.order - order))])
 
 
-def spectrum_of(signal: Float[np.ndarray, " n"], samples: int) -> OrderSpectrum:
-    """One-sided amplitude spectrum of a signal at evenly spaced angles, up to half the samples per revolution.
+def spectrum_of(signal: Inexact[np.ndarray, " n"], samples: int) -> OrderSpectrum:
+    """Amplitude spectrum of a signal at evenly spaced angles, up to half the samples per revolution: one-sided, but of
+    a complex signal x + i y also over negative orders, which turn backward.
 
     The mean is subtracted first, to avoid leakage into the lowest orders, and inserted at order 0.
 
@@ -48,6 +49,9 @@ def spectrum_of(signal: Float[np.ndarray, " n"], samples: int) -> OrderSpectrum:
     n = len(signal)
     weights = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)
     mean = np.sum(weights * signal) / np.sum(weights)
+    if np.iscomplexobj(signal):
+        lines = np.abs(np.fft.fft(weights * (signal - mean))) / np.sum(weights)
+        return OrderSpectrum(np.fft.fftshift(np.fft.fftfreq(n, 1 / samples)), np.fft.fftshift(lines))
     amplitude = np.abs(np.fft.rfft(weights * (signal - mean))) / np.sum(weights)
     amplitude[0] = abs(mean)
     amplitude[1 : (n + 1) // 2] *= 2  # the other half of a real line is at the negative order

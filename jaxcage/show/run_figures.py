@@ -6,13 +6,14 @@ from itertools import cycle
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Annulus, Circle, Polygon
 
-from ..analysis import Around, OrderSpectrum, RollerHistory, around, bearing_spectra, cage_forces
+from ..analysis import OrderSpectrum, RollerHistory, around, bearing_spectra, cage_forces
 from ..bearing import LoadDistribution
 from ..models import bearing_orders, roller_history
 from ..quantities import component_names, quantity
@@ -34,7 +35,7 @@ class Rollers:
     """Rollers of a bearing during a run."""
 
     history: RollerHistory
-    around: Around
+    around: xr.Dataset
     spectra: Mapping[str, OrderSpectrum]
     """Empty for a run of less than two revolutions."""
     orders: Mapping[str, float]
@@ -222,7 +223,7 @@ def _bars(model: Any, run: Trajectory, sample: int) -> list[np.ndarray]:
     ]
 
 
-def _slip_around(ax: Axes, found: Around) -> None:
+def _slip_around(ax: Axes, found: xr.Dataset) -> None:
     other = ax.twinx()
     other.spines[["top", "left"]].set_visible(False)
     _circumference(ax, "Slip of the rollers [%]")
@@ -234,7 +235,7 @@ def _slip_around(ax: Axes, found: Around) -> None:
         axis.tick_params(axis="y", labelsize=9, colors=colour)
 
 
-def _pocket_force_around(ax: Axes, found: Around) -> None:
+def _pocket_force_around(ax: Axes, found: xr.Dataset) -> None:
     """Mean pocket force over the circumference, of rollers that drive and of rollers that brake the cage."""
     degrees, width = np.degrees(found.angle), 0.9 * 360 / len(found.angle)
     ax.bar(degrees, found.driving_force, width, color=style.GREEN, label="rollers drive the cage")
