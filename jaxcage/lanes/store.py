@@ -305,7 +305,7 @@ def _write(path: Path, study: Study) -> None:
             dtype="int8" if codes else "float64",
             fill_value=-1 if codes else np.nan,
             compressors=compressors,
-            dimension_names=(*grid.axes, *variable.dims[1:]),
+            dimension_names=(*grid.axes, *map(str, variable.dims[1:])),
             attributes=variable.attrs,
         )
     with warnings.catch_warnings():  # zarr warns that this is not in the specification yet; xarray warns without it
