@@ -156,6 +156,7 @@ def test_tolerance_budget_is_the_root_of_squares():
     got = jc.design.tolerance_budget(edge, {"gap": 0.02, "mass": 0.01})
     assert got.deviation == pytest.approx({"gap": 100.0, "mass": 200.0})
     assert got.total == pytest.approx(np.hypot(100, 200))
+    assert "standard deviation 224 rpm" in str(got)  # 1.96 of it would be more than a uniform tolerance can do
 
 
 @pytest.mark.parametrize(

@@ -271,9 +271,9 @@ class ToleranceBudget:
     def __str__(self) -> str:
         order = sorted(self.deviation.items(), key=lambda item: -item[1])
         total = self.total or 1.0  # avoids 0/0 without any scatter
-        wide = lambda d: f"±{1.96 * d:.3g} {self.unit}"
-        rows = [f"  {n:<24} {wide(d)}, {100 * (d / total) ** 2:.0f} % of the variance" for n, d in order]
-        head = f"{self.name} {self.value:.6g} {self.unit}: {wide(self.total)} (95 %)"
+        size = lambda d: f"{d:.3g} {self.unit}"
+        rows = [f"  {n:<24} {size(d)}, {100 * (d / total) ** 2:.0f} % of the variance" for n, d in order]
+        head = f"{self.name} {self.value:.6g} {self.unit}: standard deviation {size(self.total)}"
         return "\n".join([head, *rows])
 
 
