@@ -116,7 +116,7 @@ _QUANTITIES = (
     Quantity("standard_error", r"$s_\lambda$", "1", "standard error of the exponents"),
     Quantity("peak", r"$\epsilon$", "1", "largest excursion observed (cage: eccentricity ratio; own system: 0)"),
     Quantity("error", "", "1", "largest error of a revolution, in units of the scale"),
-    Quantity("doubt", "", "1", "error of the exponents that comes from the steps"),
+    Quantity("doubt", "", "1", "error of the exponents that the scatter of the blocks does not show"),
     Quantity("steps", "", "1", "mean number of steps of a revolution"),
     Quantity("escape", "", "1", "revolutions of the run after which a lane is calm, infinite if chaotic to the end"),
     Quantity("outcome", "", "1", "how the integration of each lane ended"),

@@ -98,6 +98,16 @@ def test_multipliers_of_the_linear_oscillator_underdamped(omega):
     assert np.all(result.label == "periodic-1")
 
 
+def test_error_of_an_exponent_whose_growth_oscillates_in_step_with_the_blocks():
+    """A block of 15 revolutions holds 20.002 half turns of the tangent vectors, so that all blocks are wrong alike."""
+    zeta, natural = 0.05, 2.0
+    omega = 30 * natural * np.sqrt(1 - zeta**2) / 20.002
+    oscillator = jc.ForcedOscillator(linear(zeta, natural), coordinates=1)
+    result = jc.sweep(oscillator, np.array([omega]), exponents=2, horizon=0, confirm=False)
+    error = np.abs(result.exponents + zeta * natural * 2 * np.pi / omega)
+    assert np.all(error < 3 * result.standard_error) and np.all(result.standard_error < 3e-3)
+
+
 UNDERSTATED = pytest.mark.xfail(reason="the error stated of an exponent of -24 a revolution is 0.3 of what it is")
 
 

@@ -6,7 +6,7 @@ Variables, over the axes of the plan (`speed` and `initial_state` for a sweep) a
 |---|---|
 | `label`, `outcome` | kind of motion, and how the integration ended; words, on disk codes with their meanings |
 | `exponents`, `standard_error` (exponent) | Lyapunov exponents per revolution |
-| `block_growth` (growth_block, exponent), `doubt` (exponent) | exponents of each block, integration error of the mean |
+| `block_growth` (growth_block, exponent), `doubt` (exponent) | exponents of each block, error that they do not show |
 | `peak`, `error`, `steps` | largest excursion, largest error of a revolution [scale], steps per revolution |
 | `last`, `scale` (component) | final state, characteristic magnitude of each component |
 | `strobe` (revolution, component) | last strobe states, for models whose revolutions repeat |
@@ -44,7 +44,7 @@ PENDING = "pending"
 
 
 def exponent_error(seen: Observation) -> Float[np.ndarray, "lanes exponents"]:
-    """Standard error of the exponents: scatter of the blocks combined with the integration error."""
+    """Standard error of the exponents: scatter of the blocks combined with the error that it does not show."""
     return np.hypot(scatter(seen.growth, axis=1), seen.doubt)
 
 

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from ..analysis import scatter
 from ..models import ESCAPE, AbstractForcedSystem
 from ..solve import (
     IMPLICIT,
@@ -64,7 +65,7 @@ class Observation(NamedTuple):
     error: Float[np.ndarray, " lanes"]
     """Largest error of a revolution, in units of the scale."""
     doubt: Float[np.ndarray, "lanes exponents"]
-    """Integration error of the exponents per revolution."""
+    """Error of the exponents per revolution that blocks do not show: of the integration, of oscillations in a block."""
     steps: Float[np.ndarray, " lanes"]
     """Mean number of steps in an observed revolution."""
     integrals: Float[np.ndarray, "lanes blocks beside"]
@@ -241,7 +242,12 @@ class _Observer:
             if held > 1:
                 last_ones = ran.strobe[:, -(CHECKED + 1) :]
                 error[alive] = np.maximum(error[alive], self._error(plain, some[alive], last_ones, method))
-        found.growth[:] = growth.reshape(count, run.followed, run.block, run.exponents).mean(axis=2)
+        growth = growth.reshape(count, run.followed, run.block, run.exponents)
+        found.growth[:] = growth.mean(axis=2)
+        # Half the range of an oscillation is left in the mean, also where all blocks hold equally many of its periods.
+        summed = np.cumsum(growth - found.growth.mean(axis=1)[:, None, None], axis=2)
+        left = np.ptp(summed, axis=2).mean(axis=1) / (2 * run.followed * run.block)
+        found.doubt[:] = np.hypot(found.doubt, np.where(left > scatter(found.growth, axis=1), left, 0.0))
         found.last[outcome == 0] = (state[:, :dim] * scale)[outcome == 0]
         return found
 
