@@ -33,6 +33,11 @@ unwrap = inspect.unwrap
         (lambda: jc.sweep(DUFFING, SPEEDS, revolution=9), "`revolution` must be a setting of a run, one of: discard, "),
         (lambda: jc.sweep(DUFFING, SPEEDS, tolerance=1e-9, method=jc.native()), "`method` and `tolerance` must not be"),
         (lambda: jc.zones(jc.sweep(DUFFING, SPEEDS, exponents=0, discard=1, revolutions=20)), "at least one exponent"),
+        (
+            lambda: jc.zones(jc.sweep([CASE, CASE], SPEEDS * 900, discard=1, revolutions=20, horizon=0)),
+            r"must be over speed and initial state, but is over \('design', ",
+        ),
+        (lambda: jc.stretches(3), "`sweep` must be of kind Dataset, but 3"),
         (lambda: study(CASE, {"speed": np.zeros(1)}), "`speed` must be positive and finite, .* but 0 was given"),
         (lambda: study(CASE, {"speed": np.array([9000.0])}), "`speed` must be in rad/s"),
         (

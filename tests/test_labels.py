@@ -169,6 +169,8 @@ def test_narrow_windows_are_closed_and_wide_ones_are_not():
     assert zone.width_rpm == pytest.approx(800)
     assert zone.onset.uncertainty_rpm == pytest.approx(100) and zone.onset.kind == "chaotic"
     assert len(jc.zones(made("11###1111##11"), 500.0).zones) == 2
+    parts = made("11###111##11").isel(speed=np.r_[6:12, 0:6])  # joined in another order
+    assert jc.zones(parts, 500.0) == found
 
 
 def test_zones_that_run_past_the_range_are_open():

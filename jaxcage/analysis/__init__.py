@@ -86,4 +86,4 @@ from .zones import (
 )
 
 
-check_layer(globals(), "around cage_forces measures survival zones")
+check_layer(globals(), "around cage_forces measures stretches summary survival zones")

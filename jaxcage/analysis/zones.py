@@ -222,6 +222,7 @@ def zones(sweep: xr.Dataset, close_below_rpm: float | None = None) -> Zones:
     larger, the distance to the first speed on either side at which the interval of the mean life (95 %) excludes the
     horizon.
     """
+    sweep = _ascending(sweep)
     if not sweep.sizes["exponent"]:
         raise ArgumentError("sweep", said="must have at least one exponent, but has none.")
     rpm, label = sweep["rpm"].values, sweep["label"].values
@@ -238,6 +239,13 @@ def zones(sweep: xr.Dataset, close_below_rpm: float | None = None) -> Zones:
         _zones(sweep, chaos, runs(chaotic & ~lasts), "transient"),
         sweep.attrs["horizon"],
     )
+
+
+def _ascending(sweep: xr.Dataset) -> xr.Dataset:
+    """The sweep with its speeds in ascending order, in which parts that were joined need not be."""
+    if sweep["label"].dims != ("speed", "initial_state"):
+        raise ArgumentError("sweep", said=f"must be over speed and initial state, but is over {sweep['label'].dims}.")
+    return sweep.sortby("speed")
 
 
 def _undecided(found: xr.Dataset, chaotic: Bool[np.ndarray, " speeds"]) -> Bool[np.ndarray, " speeds"]:
@@ -278,6 +286,7 @@ def stretches(sweep: xr.Dataset) -> tuple[Stretch, ...]:
 
     **Arguments:** result of `sweep`. **Returns:** stretches in ascending order, accurate to half the spacing of speeds.
     """
+    sweep = _ascending(sweep)
     rpm, label = sweep["rpm"].values, sweep["label"].values
     kinds = [_kind(sweep, label, i) for i in range(rpm.size)]
     ends = [0, *(i for i in range(1, len(kinds)) if kinds[i] != kinds[i - 1]), len(kinds)]
