@@ -152,7 +152,10 @@ class Engine:
         width = 1 if field.excursion is None and lanes == 1 else WIDTH
         march = self._compiled(width)
         run = lambda: march(at[0], lanes, strobes, keep, *at[1:])
-        _run_threads(run, min(threads, -(-lanes // width)), queue, lambda: report(int(queue[2]) / strobes))
+        if lanes == 1 and strobes <= self._samples:  # shorter than the start of a thread
+            run()
+        else:
+            _run_threads(run, min(threads, -(-lanes // width)), queue, lambda: report(int(queue[2]) / strobes))
         part = lambda name: stored[rows[name][0]]
         turned = np.roll(strobe, -strobes % keep, axis=1)  # the latest last
         numbers_of, peaks = n + field.beside, part("peak")[:, None, None]
