@@ -8,13 +8,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import beyond_range, elastic, in_other_units, preliminary, wide_but
+from helpers import beyond_range, in_other_units, preliminary, wide_but
 from hypothesis import assume, given, settings, strategies as st
 from scipy.integrate import simpson
 
 import jaxcage as jc
 from jaxcage.models import FORCES
-from jaxcage.solve.kernel import Pieces
 
 
 CASE = preliminary("1a")
@@ -183,53 +182,6 @@ def test_film_takes_energy_out_in_a_frame_that_turns_at_half_speed(film, design,
     assert arc / (1 + eps) ** 3 * (1 - 1e-9) <= found <= arc / (1 - eps) ** 3 * (1 + 1e-9)
 
 
-# --- motion ----------------------------------------------------------------------------------
-
-DEFAULT, EXPLICIT = jc.method(), jc.method("rk4", steps=512)
-SYSTEMS = "fixed_half", "positive_pressure", "elastic rib"
-
-
-def system(kind, design, **changes):
-    """A design with one of the films, or in an elastic rib."""
-    film = "fixed_half" if kind == "elastic rib" else kind
-    if film == "positive_pressure":  # the thrust of the supply jumps with the arc where the drive is zero
-        changes["supply_pressure"] = 0.0
-    model = jc.replace(CASE, **{**design, **changes, "film.model": film})
-    return elastic(model) if kind == "elastic rib" else model
-
-
-def start_of(kind, cage, rib):
-    return np.concatenate([cage[:2], rib[:2], cage[2:], rib[2:]]) if kind == "elastic rib" else cage
-
-
-@eqx.filter_jit
-def revolution(system, scale, speed, state, phase):
-    """One revolution from `phase` on, in units of `scale`."""
-    strobe = jc.strobe_map(system, speed, DEFAULT)
-    start = tuple(state * jnp.stack(scale))
-    end = strobe.method.advance(Pieces(strobe.field, strobe.system, strobe.scale), start, phase, 1)
-    return jnp.stack(end.y) / jnp.stack(scale)
-
-
-def after(model, speed, state, phase=0.0, seen=None):
-    """State after a revolution of the model, or of what `seen` makes of it, over the model's scale."""
-    at, start, phase = (jnp.asarray(x, dtype=float) for x in (speed, state, phase))
-    return np.asarray(revolution(seen or model, model.scale(at), at, start, phase))
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("kind", SYSTEMS)
-@random(20)
-@given(designs, speeds, states(0.01, 0.9), states(0.0, 0.05, 0.05), angles)
-def test_turned_starts_have_turned_ends(kind, design, speed, cage, rib, angle):
-    """Without weight and synchronous impact; the revolution begins at the phase of the unbalance."""
-    model = system(kind, design, gravity=0.0, amplitude=0.0, stiffness_y=design["stiffness_x"])
-    start = start_of(kind, cage, rib)
-    turned = np.kron(np.eye(start.size // 2), turn(angle))
-    end, found = after(model, speed, start), after(model, speed, turned @ start, angle)
-    np.testing.assert_allclose(found, turned @ end, rtol=0, equal_nan=False, atol=1e-9 * np.linalg.norm(end))
-
-
 # --- energy and phase volume -----------------------------------------------------------------
 
 STEPS = 512
@@ -290,7 +242,10 @@ def smooth_motions(count):
     """
     dice, found = np.random.default_rng(4), 0
     while found < count:
-        model = jc.replace(CASE, **{name: dice.uniform(*ends) for name, ends in RANGES.items()})
+        design = {name: dice.uniform(*ends) for name, ends in RANGES.items()}
+        if found % 2:  # the thrust of the supply jumps with the arc where the drive is zero
+            design |= {"supply_pressure": 0.0, "film.model": "positive_pressure"}
+        model = jc.replace(CASE, **design)
         speed = float(dice.uniform(jc.rpm(2500.0), jc.rpm(27500.0)))
         away, angle = dice.uniform(0.02, 0.7), dice.uniform(-np.pi, np.pi)
         start = np.array([away * np.cos(angle), away * np.sin(angle), *dice.uniform(-0.5, 0.5, 2)])
