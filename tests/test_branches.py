@@ -106,15 +106,6 @@ def side_by_side(count):
     return jc.branch(system, orbit, "g", lower=0.15, upper=0.28, method=FINE)
 
 
-@pytest.mark.wide
-def test_two_identical_oscillators_double_together():
-    """Both double at the force at which one alone does (DOP853)."""
-    (point,) = side_by_side(2).special
-    assert (point.kind, point.status, point.edge) == ("double period-doubling", "converged", True)
-    assert abs(point.value - DOUBLING) < point.error + 2e-9 and point.error < 1e-6
-    np.testing.assert_allclose(np.sort(abs(point.multipliers + 1))[:2], 0.0, atol=1e-3)
-
-
 class Bend(eqx.Module):
     """x' = p + a x - x^3."""
 

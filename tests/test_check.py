@@ -40,15 +40,6 @@ def test_probability_of_a_range_is_joint():
     assert chance.interval == pytest.approx((1 - 0.2685, 1 - 0.0555), abs=1e-3)
 
 
-def test_failed_draws_are_never_counted_as_calm():
-    """61 calm draws of 64 are calm, unless the other three failed and one more is chaotic."""
-    chaotic, failed = np.zeros((64, 2), bool), np.zeros((64, 2), bool)
-    failed[:3, 0] = True
-    assert range_chance(ensemble(chaotic, failed), 900, 2100)[0].state == "calm"
-    chaotic[10, 1] = True
-    assert range_chance(ensemble(chaotic, failed), 900, 2100)[0].state == "not decided"
-
-
 def test_an_index_tells_what_decides():
     """An outcome that one unknown decides alone has index 1 for it, and none for three others."""
     chaotic = np.repeat((np.arange(128) < 32)[:, None], 2, axis=1)

@@ -33,19 +33,18 @@ REFUSED = [
     ("sweep nowhere.toml", "must be a readable TOML file"),
     ("sweep 1a --sped 3", "--sped, 3 (see jaxcage sweep --help)"),
     ("sweep 1a --first 0", "--first"),
-    ("zones 1a --first 9000 --last 9000", "the range is 9000 to 9000 rpm"),
     ("sweep 1a --count 2.5", "--count"),
     ("sweep 1a --count 1000000000000", "at most 10000000"),
     ("sweep 1a --revolutions 37", "--revolutions must be a multiple of 10"),
     ("sweep 1a --exponents 9", "--exponents must be at most 4"),
     ("sweep 1a --solver euler", "--solver must be one of"),
     ("sweep 1a --tolerance 2", "--tolerance"),
+    ("sweep 1a --tolerance low", '--tolerance must be a number, but is "low"'),
     ("sweep 1a --steps 64 --tolerance 1e-6", "--steps and --tolerance"),
     ("sweep 1a --out=", "--out must name a folder"),
     ("simulate 1a --speed 1e308", "--speed must be at most 1e+06 rpm"),
-    ("simulate 1a --speed 100000", "62516 rpm"),
-    ("simulate 1a --speed 8500 --load '300 N'", "--load goes with a bearing"),
     ("poincare 1a", "--speed"),
+    ("poincare 1a --speed '0.45 mm'", 'has the unit "mm", where a unit like "rpm" is wanted'),
     ("statics 1a --load -4450", "--load must be above 0 N"),
     ("statics 1a --load heavy", '"heavy"'),
     ("statics 1a --speed 6e4 --load 1e-10", "--load and --speed"),
@@ -76,14 +75,11 @@ REFUSED = [
     ("design 1a --vary load=1:2 --vary load=1:3", "load was given twice"),
     ("design 1a --vary eccentricity=30um:60um", "--vary must let the eccentricity become smaller"),
     ("sensitivity 1a --samples 3", "--samples must be a power of 2"),
-    ("identify 1a data.csv", "must be a TOML file with ranges"),
     ("report 1a --operating fast", "--operating must be a range of speed"),
     ("check 1a --operating 8500", "--operating must be two speeds"),
-    ("check 1a --operating 8500-90000", "62516 rpm"),
     ("check 1a --operating 900-4,2e3", "without commas"),
     ("gradient 1a --speed 1e4", "--speed goes with a bearing"),
     # Whole bearings.
-    ("bifurcations nu2310", "takes a cage"),
     ("sweep nu2310 --exponents 2", "--exponents must be at most 1"),
     ("sweep nu2310 --horizon 5", "Option --horizon must be left out for a model whose revolutions do not repeat"),
     ("runup nu2310 --last 200000", "300 m/s at its land"),
@@ -207,10 +203,12 @@ print(status, sorted({"jax", "scipy", "matplotlib"} & set(sys.modules)))
 """
 
 
-@pytest.mark.parametrize("arguments, status", [("--version", 0), ("sweep --help", 0), ("sweep 1a --sped 3", 2)])
-def test_help_version_and_errors_of_typing_load_no_jax(arguments: str, status: int):
+@pytest.mark.parametrize(
+    "arguments, status", [("--version", 0), ("sweep --help", 0), ("sweep 1a --sped 3", 2), ("init new.toml", 0)]
+)
+def test_help_version_init_and_errors_of_typing_load_no_jax(tmp_path: Path, arguments: str, status: int):
     command = [sys.executable, "-c", MODULES, *arguments.split()]
-    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    lines = subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path).stdout.splitlines()
     assert lines[-1] == f"{status} []"
     if arguments == "--version":
         assert lines[0] == f"jaxcage {jaxcage.__version__}"

@@ -69,7 +69,7 @@ def test_a_simulation_that_fails_says_so(capsys: pytest.CaptureFixture[str], tmp
 
 def test_statics(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     """Three rollers carry 4450 N, as the physics page prints it."""
-    found = document(capsys, "statics", "1a", "--load", "4450", "--out", str(tmp_path))
+    found = document(capsys, "statics", "1a", "--load", "4.45 kN", "--out", str(tmp_path))
     assert found["max_load"] == pytest.approx(2420, rel=1e-3)
     assert found["shaft_shift"] == pytest.approx(26.1e-6, rel=1e-3)
     assert math.degrees(found["half_angle"]) == pytest.approx(40.0, rel=1e-3)

@@ -67,11 +67,6 @@ def test_bearing_of_50_mm_radius():
     assert np.degrees(attitude_angle(eps)) == pytest.approx(40.58502207, abs=6e-9)
 
 
-@pytest.mark.parametrize("eps", [1e-8, 1e-3, 0.2, 0.5, 0.9, 0.999])
-def test_eccentricity_ratio_inverts_the_load_number(eps):
-    assert eccentricity_ratio(float(load_number(eps))) == pytest.approx(eps, rel=1e-6)
-
-
 @pytest.mark.wide
 def test_smallest_threshold():
     eps = np.linspace(0.4, 0.5, 10001)

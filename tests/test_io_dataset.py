@@ -8,7 +8,7 @@ import xarray as xr
 from helpers import cage_sweep, preliminary, read_columns
 
 import jaxcage as jc
-from jaxcage.files import check_writable, configuration, model_from
+from jaxcage.files import configuration, model_from
 from jaxcage.lanes import load, save, stored_configuration
 from jaxcage.show import trajectory_columns, write_columns
 
@@ -46,11 +46,3 @@ def test_trajectory_as_csv(tmp_path: Path):
     assert ",".join(columns) == expected
     np.testing.assert_allclose(columns["vy_C [m/s]"], state[:, 3], rtol=1e-11)
     np.testing.assert_allclose(columns["film_y [N]"], force["film"][:, 1], rtol=1e-11)
-
-
-def test_writable_folders_are_made(tmp_path: Path):
-    assert check_writable(tmp_path / "a" / "b").is_dir()
-    assert not any((tmp_path / "a" / "b").iterdir())
-    (tmp_path / "file").write_text("")
-    with pytest.raises(ValueError, match="must be a folder that can be written to, but: "):
-        check_writable(tmp_path / "file")

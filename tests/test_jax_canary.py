@@ -7,9 +7,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-
-import jaxcage as jc
 
 
 @pytest.mark.parametrize("n", [16383, 16384, 16385, 32769])
@@ -19,23 +16,6 @@ def test_batched_reduction_is_right(n: int):
     x = np.linspace(-1, 1, 3 * n).reshape(n, 3)
     got = jax.jit(jax.vmap(lambda v: jnp.sum((jnp.asarray(m) @ v) ** 2)))(jnp.asarray(x))
     assert np.allclose(got, np.sum((x @ m.T) ** 2, axis=1), rtol=1e-13)
-
-
-def test_this_jax_is_not_a_known_bad_one():
-    assert float(jc.case("1a").guidance_gap) > 0 and jax.__version__ not in ("0.10.2", "0.11.0")
-
-
-def test_the_integration_kernel_runs_on_this_jax():
-    """The compiled kernel of sweeps, not a path round it: two revolutions of case 1a, beside SciPy's LSODA."""
-    model, speed = jc.case("1a"), jc.rpm(15000)
-    found = jc.sweep(
-        model, speed, discard=0, revolutions=2, blocks=1, keep=2, initial_states=1, confirm=False, horizon=0
-    )
-    field, scale = model.at_speed(jnp.asarray(speed)), np.array(model.scale(jnp.asarray(speed)))
-    start = np.array(model.initial_states(jnp.asarray(speed))[0])
-    rates = jax.jit(lambda tau, y: jnp.stack(field(tau, tuple(y))))
-    expected = solve_ivp(rates, (0, 4 * np.pi), start, "LSODA", rtol=1e-6, atol=1e-6 * scale)
-    assert np.max(np.abs(found.strobe[0, 0, -1] - expected.y[:, -1]) / scale) < 1e-3
 
 
 def asked_of(version: str) -> tuple[list[str], str]:
