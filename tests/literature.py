@@ -343,28 +343,39 @@ def nu2310() -> Iterator[Row]:
 # Contact.
 
 
+def bounce(force: Callable[[Any, Any], Any], mass: float, v0: float, scale: float) -> tuple[float, float, float]:
+    """Speed after over speed before, greatest depth [m] and duration [s] of an impact on a force of depth and its rate;
+    `scale` is the order of the depth."""
+    normal = jax.jit(force)
+    push = lambda t, y: [float(y[1]), -float(normal(jnp.asarray(y[0]), jnp.asarray(y[1]))) / mass]
+    out, deepest = (lambda t, y: float(y[0])), (lambda t, y: float(y[1]))
+    out.terminal, out.direction = True, -1  # pyright: ignore[reportFunctionMemberAccess]
+    how: Any = dict(method="DOP853", events=[out, deepest], rtol=1e-10, atol=[1e-11 * scale, 1e-11 * v0])
+    done = solve_ivp(push, (0.0, 200 * scale / v0), [0.0, v0], **how)
+    assert done.status == 1, "the body did not leave the contact"
+    return -done.y[1, -1] / v0, float(done.y_events[1][0][0]), float(done.t[-1])
+
+
+MASS, STIFFNESS, V0, N = 0.2, 3e8, 0.1, 10 / 9
+DEPTH = (MASS * V0**2 / STIFFNESS) ** (1 / (N + 1))
+"""Scale of the depth of an impact of this mass [kg] at this speed [m/s]."""
+
+
+def impact(restitution: float) -> tuple[float, float, float]:
+    """A bounce from our contact force."""
+    chi = float(forces.restitution_damping(restitution))
+    normal = lambda p, v: forces.contact_force(jnp.maximum(p, 0.0), v, STIFFNESS, chi / V0)
+    return bounce(normal, MASS, V0, DEPTH)
+
+
 def contact() -> Iterator[Row]:
-    mass, stiffness, v0, n = 0.2, 3e8, 0.1, 10 / 9
-    scale = (mass * v0**2 / stiffness) ** (1 / (n + 1))
-
-    def impact(restitution: float) -> tuple[float, float, float]:
-        """Speed after over speed before, greatest depth [m] and duration [s] of an impact on our contact force."""
-        chi = float(forces.restitution_damping(restitution))
-        normal = jax.jit(lambda p, v: forces.contact_force(p, v, stiffness, chi / v0))
-        push = lambda t, y: [float(y[1]), -float(normal(jnp.asarray(max(y[0], 0.0)), jnp.asarray(y[1]))) / mass]
-        out, deepest = (lambda t, y: float(y[0])), (lambda t, y: float(y[1]))
-        out.terminal, out.direction = True, -1  # pyright: ignore[reportFunctionMemberAccess]
-        how: Any = dict(method="DOP853", events=[out, deepest], rtol=1e-10, atol=[1e-11 * scale, 1e-11 * v0])
-        done = solve_ivp(push, (0.0, 200 * scale / v0), [0.0, v0], **how)
-        return -done.y[1, -1] / v0, float(done.y_events[1][0][0]), float(done.t[-1])
-
     for restitution in (0.9, 0.7, 0.5, 0.3):
         yield row(f"restitution, {restitution} asked for", restitution, impact(restitution)[0], 1e-5, HUNT_CROSSLEY)
     near = forces.restitution_damping(0.9999) / 1.5e-4
     yield row("damping number over 3 (1 - e)/2 at e = 0.9999", 1.0, near, 2e-4, NEAR_ONE)
     speed, depth, duration = impact(1.0)
-    deepest = ((n + 1) / 2) ** (1 / (n + 1)) * scale
-    lasting = 2 * deepest / v0 * math.sqrt(math.pi) * gamma(1 + 1 / (n + 1)) / gamma(0.5 + 1 / (n + 1))
+    deepest = ((N + 1) / 2) ** (1 / (N + 1)) * DEPTH
+    lasting = 2 * deepest / V0 * math.sqrt(math.pi) * gamma(1 + 1 / (N + 1)) / gamma(0.5 + 1 / (N + 1))
     yield row("restitution of an elastic impact", 1.0, speed, 1e-6, IMPACT)
     yield share("greatest depth [um]", 1e6 * deepest, 1e6 * depth, 1e-6, IMPACT)
     yield share("duration [us]", 1e6 * lasting, 1e6 * duration, 1e-6, IMPACT)

@@ -5,20 +5,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import preliminary
-from scipy.integrate import solve_ivp
+from literature import bounce, impact
 
 import jaxcage as jc
 from jaxcage.forces import contact_force, power_10_9, restitution_damping, smooth_plus
 
 
-# Requested restitution and the damping number that delivers it, by root finding on the exact law.
-EXACT = {0.9: 0.166482, 0.7: 0.634828, 0.5: 1.432751, 0.3: 3.087082}
-
-
-@pytest.mark.parametrize("restitution", EXACT)
+@pytest.mark.parametrize("restitution", [0.9, 0.7, 0.5, 0.3])
 def test_damping_number(restitution):
+    """The root of the exact law but 0, and its derivative."""
     chi = float(restitution_damping(restitution))
-    assert chi == pytest.approx(EXACT[restitution], abs=1e-6)
+    assert chi > 1 - restitution
     defect = np.log((1 + chi) / (1 - chi * restitution)) - chi * (1 + restitution)
     assert abs(defect) < 1e-11
     # Implicit differentiation of ln(1 + chi) - ln(1 - chi e) = chi (1 + e).
@@ -33,35 +30,10 @@ def test_damping_number_near_elastic_contact():
     assert float(jax.grad(restitution_damping)(1.0)) == pytest.approx(-1.5, rel=1e-6)
 
 
-def leaving_speed(force, mass, v0, depth):
-    """Speed ratio after a body that enters at v0 has left the contact."""
-
-    def rates(_, y):
-        return [y[1], -force(y[0], y[1]) / mass]
-
-    def left(_, y):
-        return y[0]
-
-    left.terminal, left.direction = True, -1  # pyright: ignore[reportFunctionMemberAccess]
-    end = 200 * depth / v0
-    options = dict(method="DOP853", rtol=1e-11, atol=[1e-12 * depth, 1e-12 * v0], events=left)
-    solution = solve_ivp(rates, (0.0, end), [0.0, v0], **options)
-    assert solution.status == 1, "the body did not leave the contact"
-    return -solution.y[1, -1] / v0
-
-
 @pytest.mark.parametrize("restitution", [0.05, 0.1, 0.2])
 def test_weak_restitution_is_delivered(restitution):
     """Down to the lower limit of the parameter, where the force all but vanishes on the way out."""
-    mass, stiffness, v0 = 0.2, 3e8, 0.1
-    chi = float(restitution_damping(restitution))
-    normal = jax.jit(lambda p, v: contact_force(p, v, stiffness, chi / v0))
-
-    def force(p, v):
-        return float(normal(jnp.asarray(max(p, 0.0)), jnp.asarray(v)))
-
-    depth = (mass * v0**2 / stiffness) ** (9 / 19)
-    assert leaving_speed(force, mass, v0, depth) == pytest.approx(restitution, rel=0.1)
+    assert impact(restitution)[0] == pytest.approx(restitution, rel=0.1)
 
 
 def test_land_contact_of_the_cage_delivers_restitution():
@@ -70,16 +42,8 @@ def test_land_contact_of_the_cage_delivers_restitution():
     model = jc.replace(preliminary("1a"), restitution=0.5, approach_speed=0.2, **small)
     cage = model.cage_at(1000.0)
     c, onset = float(model.clearance), float(model.contact.onset)
-
-    @jax.jit
-    def normal(p, v):
-        return -cage.forces(0.0, onset * c + p, 0.0 * p, v, 0.0 * v)["contact"][0]
-
-    def force(p, v):
-        return float(normal(jnp.asarray(p), jnp.asarray(v)))
-
-    found = leaving_speed(force, float(cage.mass), 0.2, 1e-5)
-    assert found == pytest.approx(0.5, abs=1e-3)
+    normal = lambda p, v: -cage.forces(0.0, onset * c + p, 0.0 * p, v, 0.0 * v)["contact"][0]
+    assert bounce(normal, float(cage.mass), 0.2, 1e-5)[0] == pytest.approx(0.5, abs=1e-3)
 
 
 @pytest.mark.parametrize("rate", [-1e3, -1.0, -0.1, 0.0, 0.1, 10.0])
