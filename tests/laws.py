@@ -31,3 +31,12 @@ def double_well(g=0.26, d=0.3, k=1.0, b=1.0, **settings):
 
 def hardening(g=0.3, d=0.1, **settings):
     return double_well(g, d, -1.0, **settings)
+
+
+def about_an_orbit(tau, y, speed, turn, rates):
+    """Rates of a state about the orbit (cos, sin), in a frame that makes `turn` revolutions a period about it; there
+    `rates` gives those of the distance from the orbit."""
+    cos, sin, along, across = jnp.cos(tau), jnp.sin(tau), jnp.cos(turn * tau), jnp.sin(turn * tau)
+    x, v, spin = y[0] - cos, y[1] - sin, turn * speed
+    de, df = rates(along * x + across * v, -across * x + along * v)
+    return along * de - across * df - spin * v - speed * sin, across * de + along * df + spin * x + speed * cos

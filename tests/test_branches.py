@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import slow_but, wide_but
-from laws import double_well, hardening, numbers
+from laws import about_an_orbit, double_well, hardening, numbers
 from literature import DUFFING_DOUBLINGS, DUFFING_FOLDS
 
 import jaxcage as jc
@@ -90,20 +90,13 @@ def test_a_branch_from_a_point_begins_at_the_value_where_that_was_found(doubling
     assert min(abs(p.value - DOUBLING) for p in found.special) < 1e-7
 
 
-class Twins(eqx.Module):
-    """Two identical oscillators x'' = -0.3 x' + x - x^3 + g cos(tau), side by side."""
+class Identical(eqx.Module):
+    """Identical oscillators x'' = -0.3 x' + x - x^3 + g cos(tau), side by side."""
 
     g: jax.Array
 
     def __call__(self, tau, q, v, speed):
         return tuple(-0.3 * u + x - x**3 + self.g * jnp.cos(tau) for x, u in zip(q, v, strict=True))
-
-
-def side_by_side(count):
-    system = jc.ForcedOscillator(Twins(jnp.asarray(0.2)), coordinates=count)
-    guess = (1.0,) * count + (0.0,) * count
-    orbit = jc.periodic_orbit(system, 1.2, guess=guess, revolutions=100, method=FINE)
-    return jc.branch(system, orbit, "g", lower=0.15, upper=0.28, method=FINE)
 
 
 class Bend(eqx.Module):
@@ -181,23 +174,15 @@ class Planted(eqx.Module):
     b: jax.Array
 
     def __call__(self, tau, y, speed):
-        cos, sin = jnp.cos(tau), jnp.sin(tau)
-        z = [y[0] - cos, y[1] - sin, y[2] - cos, y[3] - sin]
-        half, side = jnp.cos(tau / 2), jnp.sin(tau / 2)
-        frames = [(z[0], z[1], 1.0, 0.0, 0.0), (*self._turned(half, side, z[2], z[3]), half, side, speed / 2)]
-        rates = []
-        for i, (e, f, along, across, spin) in enumerate(frames):
-            growth = self.a[i] + self.c[i] * self.p
-            de = (growth + self.s[i]) * e - self.b[i] * f - (e * e + f * f) * e
-            df = (growth - self.s[i]) * f + self.b[i] * e - (e * e + f * f) * f
-            x, v = along * de - across * df, across * de + along * df
-            rates += [x - spin * z[2 * i + 1] - speed * sin, v + spin * z[2 * i] + speed * cos]
-        rates[2] += 0.3 * z[0]
-        return tuple(rates)
+        def block(i):
+            def rates(e, f):
+                growth = self.a[i] + self.c[i] * self.p - (e * e + f * f)
+                return (growth + self.s[i]) * e - self.b[i] * f, (growth - self.s[i]) * f + self.b[i] * e
 
-    @staticmethod
-    def _turned(half, side, x, v):
-        return half * x + side * v, -side * x + half * v
+            return about_an_orbit(tau, y[2 * i : 2 * i + 2], speed, i / 2, rates)
+
+        first, (x, v) = block(0), block(1)
+        return (*first, x + 0.3 * (y[0] - jnp.cos(tau)), v)
 
 
 def planted(a, c, s=(0.0, 0.0), b=(0.0, 0.0)):
@@ -278,7 +263,9 @@ def test_multipliers_that_cross_together(kind, block):
 @pytest.mark.wide
 def test_crossing_that_is_not_found_is_said_to_be_unexplained():
     """Four identical oscillators double together: more than is looked for."""
-    branch = side_by_side(4)
+    system = jc.ForcedOscillator(Identical(jnp.asarray(0.2)), coordinates=4)
+    orbit = jc.periodic_orbit(system, 1.2, guess=(1.0,) * 4 + (0.0,) * 4, revolutions=100, method=FINE)
+    branch = jc.branch(system, orbit, "g", lower=0.15, upper=0.28, method=FINE)
     assert sorted(kinds(branch)) == ["double period-doubling", "unexplained"] and "unexplained" in str(branch)
     for point in branch.special:
         assert abs(point.value - DOUBLING) < point.error + 2e-9 and point.error < 2e-4  # printed to nine digits

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import wide_but
+from laws import about_an_orbit
 from shooting import edge_speed, orbit, readings
 
 import jaxcage as jc
@@ -35,12 +36,8 @@ class Window(eqx.Module):
 
     def __call__(self, tau, y, speed):
         growth = self.k * ((speed - self.x) * (speed - self.x - self.y) - self.d)
-        cos, sin, half, side = jnp.cos(tau), jnp.sin(tau), jnp.cos(tau / 2), jnp.sin(tau / 2)
-        a, b = y[0] - cos, y[1] - sin
-        e, f = half * a + side * b, -side * a + half * b
-        de, df = (growth - e * e - f * f) * e + self.r * f, (growth - self.s - e * e - f * f) * f + e
-        turn = speed / 2
-        return (half * de - side * df - turn * b - speed * sin, side * de + half * df + turn * a + speed * cos)
+        rates = lambda e, f: ((growth - e * e - f * f) * e + self.r * f, (growth - self.s - e * e - f * f) * f + e)
+        return about_an_orbit(tau, y, speed, 0.5, rates)
 
 
 def window(x=1.0, y=1.5, d=0.0, k=0.5, s=1.0, r=0.0):

@@ -8,10 +8,9 @@ import dataclasses
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
-from laws import double_well, hardening, numbers
+from laws import about_an_orbit, double_well, hardening, numbers
 from literature import DUFFING_DOUBLINGS, DUFFING_FOLDS
 from scipy.interpolate import CubicSpline
 
@@ -85,13 +84,11 @@ class Planted(eqx.Module):
     turn: jax.Array
 
     def __call__(self, tau, y, speed):
-        cos, sin, along, across = jnp.cos(tau), jnp.sin(tau), jnp.cos(self.turn * tau), jnp.sin(self.turn * tau)
-        x, v = y[0] - cos, y[1] - sin
-        e, f = along * x + across * v, -across * x + along * v
-        growth, cubic, spin = self.a - self.b**2 / 5, e * e + f * f, self.turn * speed
-        de = (growth + self.s - cubic) * e - self.b * f
-        df = (growth - self.s - cubic) * f + self.b * e
-        return (along * de - across * df - spin * v - speed * sin, across * de + along * df + spin * x + speed * cos)
+        def rates(e, f):
+            growth = self.a - self.b**2 / 5 - (e * e + f * f)
+            return (growth + self.s) * e - self.b * f, (growth - self.s) * f + self.b * e
+
+        return about_an_orbit(tau, y, speed, self.turn, rates)
 
 
 SPEED = 1.2

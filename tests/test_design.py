@@ -162,8 +162,6 @@ def test_tolerance_budget_is_the_root_of_squares():
 @pytest.mark.parametrize(
     "vary, options, words",
     [
-        ({"heat": (0.0, 1.0)}, {}, "must be one of mass, damping"),
-        ({"damping": (1.0, 0.5)}, {}, "must ascend"),
         ({"damping": (0.5, 1.0)}, {}, "must lie within the bounds, but damping does not"),
         (VARY, {"batches": 0}, "at least 1"),
         (VARY, {"batch": 1}, "at least 2"),

@@ -81,15 +81,7 @@ def test_bars_of_nu2310_as_they_are():
 
 def test_derivatives_by_every_parameter_of_the_impact():
     model, h = cage(), 1e-4
-    names = [
-        "approach_ratio",
-        "unmatched",
-        "cage_modulus",
-        "cage_mass",
-        "load",
-        "pocket_clearance",
-        "roller_diameter",
-    ]
+    names = ["approach_ratio", "unmatched", "cage_modulus", "cage_mass", "load", "pocket_clearance", "roller_diameter"]
     names += ["roller_length", "bearing.roller_material.density", "radial_clearance"]
     at = jnp.stack([jc.parameters(model)[name] for name in names])
 
@@ -140,9 +132,8 @@ def test_check_of_the_same_bearing_in_brass_and_peek(capsys: pytest.CaptureFixtu
         found[name] = document(capsys, *given, "--out", str(tmp_path))
     forces = {name: {row["force on the cage"]: row for row in x["forces"]} for name, x in found.items()}
     at = "14000 rpm shaft"
-    ratio = {
-        force: forces["PEEK"][force][at] / forces["brass"][force][at] for force in ("weight", "unbalance", "impact")
-    }
+    names = "weight", "unbalance", "impact"
+    ratio = {name: forces["PEEK"][name][at] / forces["brass"][name][at] for name in names}
     assert ratio["weight"] == pytest.approx(1510 / 8430) == ratio["unbalance"]
     assert ratio["weight"] < ratio["impact"] < 1
     assert forces["brass"]["impact"][at] == pytest.approx(3.2, rel=0.05)
