@@ -11,6 +11,7 @@ import literature as table
 import numpy as np
 import reference
 import xarray as xr
+from laws import double_well, hardening
 from literature import Row, beside, row, share
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -89,19 +90,17 @@ def largest_exponent(
 
 
 def _exponents(
-    system: Any,
-    speed: float,
-    centre: tuple[float, ...],
-    initial_states: int,
-    count: int,
-    steps: int,
-    discard: int,
-    length: int,
+    system: Any, speed: float, centre: Any, initial_states: int, count: int, steps: int, discard: int, length: int
 ) -> xr.Dataset:
     around = np.asarray(centre) + np.random.default_rng(0).uniform(-1, 1, (initial_states, len(centre)))
     how: Any = dict(exponents=count, blocks=10, keep=1, method=jc.method("rodas4", steps=steps))
     begin = [tuple(map(float, s)) for s in around]
     return jc.sweep(system, np.array([speed]), initial_states=begin, discard=discard, revolutions=length, **how)
+
+
+def _means(*asked: Any) -> np.ndarray:
+    """Exponents per period, as means over the initial states."""
+    return _exponents(*asked).exponents.values[0].mean(axis=0)
 
 
 def driven_exponents() -> Iterator[Row]:
@@ -111,8 +110,7 @@ def driven_exponents() -> Iterator[Row]:
         each = found.exponents.values[found.label.values == "chaotic", 0] * of.frequency / (2 * math.pi)
         sample = 3 * float(each.std(ddof=1)) / math.sqrt(each.size)
         yield beside(f"{name}, largest exponent", theirs, each.mean(), sample)
-    found = _exponents(jc.ForcedOscillator(_ueda, coordinates=1), 1.0, (0.0, 0.0), 4, 2, 512, 20, 100)
-    ours = found.exponents.values[0].mean(axis=0).sum() / (2 * math.pi)
+    ours = _means(jc.ForcedOscillator(_ueda, coordinates=1), 1.0, (0.0, 0.0), 4, 2, 512, 20, 100).sum() / (2 * math.pi)
     yield row("Ueda, sum of the exponents", -0.05, ours, 1e-6, table.TRACE)
 
 
@@ -121,17 +119,12 @@ ORDER = "largest", "second", "third"
 
 def flows() -> Iterator[Row]:
     """An autonomous system has no period: a unit of time takes its place."""
-    law = lambda rho: (
-        lambda tau, y, speed: (
-            10 * (y[1] - y[0]),
-            y[0] * (rho - y[2]) - y[1],
-            y[0] * y[1] - 8 / 3 * y[2],
-        )
-    )
-    system = lambda rho: jc.ForcedSystem(law(rho), dimension=3)
-    found = (
-        _exponents(system(28.0), 2 * math.pi, (5.0, 5.0, 25.0), 64, 3, 256, 50, 500).exponents.values[0].mean(axis=0)
-    )
+
+    def system(rho: float) -> jc.ForcedSystem:
+        law = lambda tau, y, speed: (10 * (y[1] - y[0]), y[0] * (rho - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2])
+        return jc.ForcedSystem(law, dimension=3)
+
+    found = _means(system(28.0), 2 * math.pi, (5.0, 5.0, 25.0), 64, 3, 256, 50, 500)
     name = "Lorenz 10, 28, 8/3"
     yield from (
         beside(f"{name}, {n} exponent", theirs, x) for n, theirs, x in zip(ORDER, table.LORENZ, found, strict=True)
@@ -139,17 +132,12 @@ def flows() -> Iterator[Row]:
     yield row(f"{name}, sum", -41 / 3, found.sum(), 1e-4, table.TRACE)
     yield beside(f"{name}, dimension of Kaplan and Yorke", table.LORENZ_DIMENSION, 2 + found[0] / abs(found[2]))
     fixed = math.sqrt(8 / 3 * 19)
-    still = (
-        _exponents(system(20.0), 2 * math.pi, (fixed, fixed, 19.0), 2, 3, 256, 200, 500)
-        .exponents.values[0]
-        .mean(axis=0)
-    )
+    still = _means(system(20.0), 2 * math.pi, (fixed, fixed, 19.0), 2, 3, 256, 200, 500)
     decay = np.linalg.eigvals(np.array([[-10, 10, 0], [1, -1, -fixed], [fixed, fixed, -8 / 3]])).real
     yield row("Lorenz 10, 20, 8/3, largest exponent", decay.max(), still[0], 2e-3, table.EIGENVALUES)
     yield row("Lorenz 10, 20, 8/3, third exponent", decay.min(), still[2], 2e-3, table.EIGENVALUES)
     rates = lambda tau, y, speed: (-y[1] - y[2], y[0] + 0.2 * y[1], 0.2 + y[2] * (y[0] - 5.7))
-    found = _exponents(jc.ForcedSystem(rates, dimension=3), 1.0, (0.0, -5.0, 0.0), 64, 3, 512, 20, 400)
-    each = found.exponents.values[0].mean(axis=0) / (2 * math.pi)
+    each = _means(jc.ForcedSystem(rates, dimension=3), 1.0, (0.0, -5.0, 0.0), 64, 3, 512, 20, 400) / (2 * math.pi)
     for n, theirs, x in zip(ORDER, table.ROESSLER, each, strict=True):
         yield beside(f"Roessler .2, .2, 5.7, {n} exponent", theirs, x)
 
@@ -217,24 +205,21 @@ def _point(system: Any, kind: Any, near: Any, name: str, **options: Any) -> Any:
     return jc.bifurcation(system, kind, near, pick, method=FINE, **options).value
 
 
-def _duffing_of_all(c: Any, tau: Any, q: Any, v: Any, speed: Any) -> Any:
-    return ((-c["d"] * v[0] + c["k"] * q[0] - c["b"] * q[0] ** 3 + c["g"] * jnp.cos(tau)) / c["m"],)
-
-
 def doublings() -> Iterator[Row]:
     name, found = "Duffing x'' + .3 x' - x + x^3 = g cos 1.2t", []
     for periods, (inside, theirs) in table.DUFFING_DOUBLINGS.items():
-        system = _system(_duffing_of_all, m=1.0, d=0.3, k=1.0, b=1.0, g=inside)
+        system = double_well(inside)
         orbit = jc.periodic_orbit(system, 1.2, periods, guess=(1.0, 0.0), revolutions=400, method=FINE)
-        found.append(float(_point(system, "period-doubling", orbit, "g", speed=1.2, periods=periods)))
+        how: Any = dict(speed=1.2, periods=periods, method=FINE)
+        found.append(float(jc.bifurcation(system, "period-doubling", orbit, "g", **how).value))
         yield beside(f"{name}: g where period {periods} doubles", theirs, found[-1])
     ratio = (found[2] - found[1]) / (found[3] - found[2])  # the error of the first one, 0.13, falls to about a fifth
     yield row(f"{name}: second ratio of distances", table.FEIGENBAUM, ratio, 0.03, table.FEIGENBAUM_1978)
-    system = _system(_duffing_of_all, m=1.0, d=0.3, k=1.0, b=1.0, g=0.262)
+    system = double_well(0.262)
     orbit = jc.periodic_orbit(system, 1.2, 1, guess=(1.0, 0.0), revolutions=400, method=FINE)
-    force = lambda system: _point(system, "period-doubling", orbit, "g", speed=1.2)
+    force = lambda system: jc.bifurcation(system, "period-doubling", orbit, "g", speed=1.2, method=FINE).value
     value, slope = eqx.filter_value_and_grad(force)(system)
-    of, name = slope.acceleration.c, "Duffing x'' + .3 x' - x + x^3 = g cos 1.2t: slope of the first by"
+    of, name = vars(slope.acceleration), "Duffing x'' + .3 x' - x + x^3 = g cos 1.2t: slope of the first by"
     for (what, theirs), ours in zip(table.DUFFING_SLOPES.items(), (of["m"], of["d"], of["k"] + of["b"]), strict=True):
         yield beside(f"{name} {what}", theirs, ours)
     yield row(f"{name} b", -value / 2, of["b"], 1e-9, table.SCALING)
@@ -265,7 +250,7 @@ def pendulum_doublings() -> Iterator[Row]:
 
 
 def folds() -> Iterator[Row]:
-    system = _system(_duffing_of_all, m=1.0, d=0.1, k=-1.0, b=1.0, g=0.3)
+    system = hardening()
     for speed, start, theirs in ((1.7, (0.6, 2.4), "up"), (1.4, (-0.3, 0.05), "down")):
         orbit = jc.periodic_orbit(system, speed, 1, guess=start, revolutions=400, method=FINE)
         ours = jc.bifurcation(system, "fold", orbit, method=FINE).value

@@ -99,16 +99,6 @@ def test_a_speed_may_be_the_shafts_or_the_cages(capsys: pytest.CaptureFixture[st
     assert run(str(path), "--speed", "20000")["speed_rpm"] == pytest.approx(20000 * RATIO)
 
 
-def test_a_configuration_file_in_place_of_a_case(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    design = tmp_path / "wide.toml"
-    design.write_text('base = "1a"\nguidance_gap = "0.28 mm"\n')
-    assert main(["statics", str(design), "--out", str(tmp_path), "--json"]) == 0
-    out, err = capsys.readouterr()
-    assert json.loads(out)["case"] == "wide"
-    assert json.loads(out)["cage_displacement"]["outer_rib"] == pytest.approx(0.14e-3)
-    assert err == ""  # T = 0.3 mm > C_r = 0.28 mm: the design rule holds
-
-
 def test_estimated_values_are_printed(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     """A gap of 0.5 mm is wider than the pocket clearance that is estimated for an NU 220, as the warning says."""
     path = tmp_path / "mine.toml"

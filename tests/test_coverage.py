@@ -29,49 +29,26 @@ unmatched = "2 (1 .. 3)"
 PLANTED = 4
 """Bearings planted in the ranges of one file."""
 DESIGNS = {
-    "NU2310": ((10000, 26000), {"cage_mass": '"0.25 kg"'}),
+    "NU2310": ((10000, 26000), 'cage_mass = "0.25 kg"'),
     "NU1014": (
         (16000, 26000),
-        {
-            "guidance_gap": '"0.25 mm +- 0.05 mm"',
-            "eccentricity": '"G6.3 at 12000 rpm shaft"',
-            "cage_mass": '"0.15 kg"',
-            "land_width": '"2 mm"',
-            "grade": "32",
-            "temperature": '"55 degC"',
-        },
+        """guidance_gap = "0.25 mm +- 0.05 mm"; eccentricity = "G6.3 at 12000 rpm shaft"; cage_mass = "0.15 kg";
+        land_width = "2 mm"; grade = 32; temperature = "55 degC" """,
     ),
     "NU208": (
         (10000, 26000),
-        {
-            "guidance_gap": '"0.3 mm +- 0.05 mm"',
-            "eccentricity": '"G40 at 9000 rpm shaft"',
-            "cage_mass": '"0.09 kg"',
-            "grade": "68",
-            "damping": '"1 (0.3 .. 3) N s/m"',
-            "amplitude": '"200 (100 .. 300) N"',
-        },
+        """guidance_gap = "0.3 mm +- 0.05 mm"; eccentricity = "G40 at 9000 rpm shaft"; cage_mass = "0.09 kg";
+        grade = 68; damping = "1 (0.3 .. 3) N s/m"; amplitude = "200 (100 .. 300) N" """,
     ),
     "NU312": (
         (6000, 20000),
-        {
-            "guidance_gap": '"0.5 mm +- 0.1 mm"',
-            "eccentricity": '"G16 at 5600 rpm shaft"',
-            "cage_mass": '"0.4 kg"',
-            "land_width": '"2 mm"',
-            "grade": "100",
-            "amplitude": '"200 (100 .. 600) N"',
-        },
+        """guidance_gap = "0.5 mm +- 0.1 mm"; eccentricity = "G16 at 5600 rpm shaft"; cage_mass = "0.4 kg";
+        land_width = "2 mm"; grade = 100; amplitude = "200 (100 .. 600) N" """,
     ),
     "NU205": (
         (10000, 30000),
-        {
-            "guidance_gap": '"0.25 mm +- 0.05 mm"',
-            "cage_mass": '"0.04 kg"',
-            "land_width": '"1 mm"',
-            "grade": "46",
-            "amplitude": '"30 (10 .. 100) N"',
-        },
+        """guidance_gap = "0.25 mm +- 0.05 mm"; cage_mass = "0.04 kg"; land_width = "1 mm"; grade = 46;
+        amplitude = "30 (10 .. 100) N" """,
     ),
 }
 """Range of the shaft's speed [rpm], and lines of the short template that differ, by designation."""
@@ -84,11 +61,12 @@ class Statements(NamedTuple):
     calm: np.ndarray
 
 
-def written(folder: Path, kind: str, designation: str, lines: dict[str, str]) -> Path:
+def written(folder: Path, kind: str, designation: str, lines: str) -> Path:
     """The short template with other lines and impacts of a kind; an amplitude goes with synchronous ones only."""
     text = template("cage", short=True).partition("[impact]")[0] + "[impact]\n" + IMPACTS[kind]
-    for key, value in {"designation": f'"{designation}"', **lines}.items():
-        text, found = re.subn(rf"(?m)^(# )?{key} = .*$", f"{key} = {value}", text)
+    for line in (f'designation = "{designation}"', *map(str.strip, lines.split(";"))):
+        key = line.partition(" ")[0]
+        text, found = re.subn(rf"(?m)^(# )?{key} = .*$", line, text)
         assert found or key == "amplitude", key
     path = folder / f"{designation}.toml"
     path.write_text(text)

@@ -1,11 +1,8 @@
 """Equilibrium and whirl of a short bearing against published closed forms and printed digits.
 
-Frame mapping. Friswell et al. (Dynamics of Rotating Machines, 2010, p. 177) take u across the load
-and v on the load line, with the rotation from u to v. Ours: x to the right, y up, load along -y,
-rotation counter-clockwise, from x to y. So u = x and v = y, and their matrices are ours entry by
-entry; turning both axes by half a turn changes nothing, so it does not matter whether v counts up
-or down, while mirroring one of them would change the sign of the cross terms. ROSS
-(`CylindricalBearing`) prints the same matrices.
+Friswell et al. (Dynamics of Rotating Machines, 2010, p. 177) take u across the load and v on the load line, with the
+rotation from u to v, as our x and y with the load along -y: their matrices are ours entry by entry, and those that ROSS
+(`CylindricalBearing`) prints. Half a turn of both axes changes nothing.
 """
 
 import equinox as eqx
