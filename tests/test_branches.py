@@ -29,12 +29,6 @@ def kinds(branch):
     return [p.kind for p in branch.special]
 
 
-@pytest.fixture(scope="module")
-def over_speed():
-    orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), revolutions=200, method=METHOD)
-    return jc.branch(hardening(), orbit, lower=0.5, upper=2.5, method=METHOD)
-
-
 @pytest.mark.wide
 def test_an_orbit_for_which_runge_kutta_takes_thousands_of_steps_has_a_branch():
     """Thick oil in a narrow gap: Rodas4 follows it, and passes through the state that 8192 steps find."""
@@ -56,14 +50,10 @@ def test_speed_and_periods_given_beside_an_orbit_count():
     assert set(found.speed.tolist()) == {0.9} and found.periods == 2
 
 
-@pytest.fixture(scope="module")
-def over_force():
-    orbit = jc.periodic_orbit(double_well(), 1.2, guess=(1.0, 0.0), revolutions=100, method=FINE)
-    return jc.branch(double_well(), orbit, "g", lower=0.1, upper=0.35, method=FINE)
-
-
-def test_branch_passes_the_folds_of_the_hardening_duffing(over_speed):
+def test_branch_passes_the_folds_of_the_hardening_duffing():
     """DOP853, all printed digits."""
+    orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), revolutions=200, method=METHOD)
+    over_speed = jc.branch(hardening(), orbit, lower=0.5, upper=2.5, method=METHOD)
     upper, lower = over_speed.special
     assert upper.kind == lower.kind == "fold" and upper.edge and lower.edge
     assert abs(upper.value - DUFFING_FOLDS["up"].value) < 1e-7
@@ -77,16 +67,13 @@ def test_branch_passes_the_folds_of_the_hardening_duffing(over_speed):
     assert np.array_equal(over_speed.stable, stable) and lower.index - upper.index > 5
 
 
-@pytest.fixture(scope="module")
-def doubling(over_force):
-    return min(over_force.special, key=lambda p: abs(p.value - DOUBLING))
-
-
-def test_a_branch_from_a_point_begins_at_the_value_where_that_was_found(doubling):
+def test_a_branch_from_a_point_begins_at_the_value_where_that_was_found():
     """Whatever the system's own value is: at a tenth of the force there is no such orbit to begin with."""
-    found = jc.branch(
-        double_well(0.1 * DOUBLING), doubling, "g", lower=0.9 * DOUBLING, upper=1.1 * DOUBLING, method=FINE
-    )
+    orbit = jc.periodic_orbit(double_well(), 1.2, guess=(1.0, 0.0), revolutions=100, method=FINE)
+    over_force = jc.branch(double_well(), orbit, "g", lower=0.1, upper=0.35, method=FINE)
+    doubling = min(over_force.special, key=lambda p: abs(p.value - DOUBLING))
+    ends = dict(lower=0.9 * DOUBLING, upper=1.1 * DOUBLING)
+    found = jc.branch(double_well(0.1 * DOUBLING), doubling, "g", **ends, method=FINE)
     assert min(abs(p.value - DOUBLING) for p in found.special) < 1e-7
 
 
@@ -223,11 +210,7 @@ def test_crossings_within_one_step_are_in_order(first):
 
 @pytest.mark.wide
 @pytest.mark.parametrize(
-    "kind, block",
-    [
-        ("period-doubling", dict(s=(0.1, 0.0002))),
-        ("Neimark-Sacker", dict(b=(0.4, 0.3))),
-    ],
+    "kind, block", [("period-doubling", dict(s=(0.1, 0.0002))), ("Neimark-Sacker", dict(b=(0.4, 0.3)))]
 )
 def test_two_crossings_of_one_kind_within_a_step(kind, block):
     """Both test functions have the same sign on either side of the pair: only the count of multipliers tells."""

@@ -4,6 +4,8 @@ Gradients stand beside differences of solutions by SciPy's DOP853 and Newton's m
 this library. "Planted" systems have edges, and so optima, that are known exactly.
 """
 
+import functools
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -138,21 +140,16 @@ def test_the_fold_of_a_cage_is_followed(given, change):
 # --- gradients ------------------------------------------------------------------------------------------------------
 
 
-class Ranges(dict):
-    """An operating range of case 1a with its orbits, when it is asked for; the land is touched in the second."""
-
-    rpm = {"calm": (12500.0, 18000.0), "touched": (20397.5, 20602.5)}
-
-    def __missing__(self, name):
-        now = {n: float(jc.parameters(CASE)[n]) for n in ("guidance_gap", "eccentricity")}
-        space = DesignSpace.of(CASE, {n: (0.8 * v, 1.2 * v) for n, v in now.items()})
-        self[name] = OperatingRange(space, tuple(float(jc.rpm(end)) for end in self.rpm[name]))
-        return self[name]
+@functools.cache
+def range_of(rpm):
+    """Speeds [rpm] with the orbits of case 1a there."""
+    now = {n: float(jc.parameters(CASE)[n]) for n in ("guidance_gap", "eccentricity")}
+    space = DesignSpace.of(CASE, {n: (0.8 * v, 1.2 * v) for n, v in now.items()})
+    return OperatingRange(space, tuple(float(jc.rpm(end)) for end in rpm))
 
 
-@pytest.fixture(scope="module")
-def ranges():
-    return Ranges()
+CALM, TOUCHED = (12500.0, 18000.0), (20397.5, 20602.5)
+"""In the second range the land is touched."""
 
 
 def independent(range_, quantity, value):
@@ -171,10 +168,10 @@ def independent(range_, quantity, value):
 
 
 GRADIENTS = [
-    *(("calm", quantity, 1e-4, 1e-5) for quantity in ("lower margin", "upper margin")),
-    *(("calm", quantity, 5e-4, 1e-5) for quantity in ("multiplier", "film", "drag")),
-    *(("touched", quantity, 1e-4, 1e-3) for quantity in ("lower margin", "upper margin")),
-    *(("touched", quantity, 1e-4, 1e-3) for quantity in ("multiplier", "film", "land force", "drag")),
+    *((CALM, quantity, 1e-4, 1e-5) for quantity in ("lower margin", "upper margin")),
+    *((CALM, quantity, 5e-4, 1e-5) for quantity in ("multiplier", "film", "drag")),
+    *((TOUCHED, quantity, 1e-4, 1e-3) for quantity in ("lower margin", "upper margin")),
+    *((TOUCHED, quantity, 1e-4, 1e-3) for quantity in ("multiplier", "film", "land force", "drag")),
 ]
 QUICK = [("guidance_gap", *GRADIENTS[i]) for i in (0, 2, 4)]
 ALL = [("guidance_gap", *row) for row in GRADIENTS] + [("eccentricity", *row) for row in GRADIENTS[:5]]
@@ -182,9 +179,9 @@ ALL = [("guidance_gap", *row) for row in GRADIENTS] + [("eccentricity", *row) fo
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name, where, quantity, step, tolerance", wide_but(ALL, *QUICK))
-def test_gradients_of_requirements(name, where, quantity, step, tolerance, ranges):
+def test_gradients_of_requirements(name, where, quantity, step, tolerance):
     """Against differences of fourth order, to 1e-5, and 1e-3 where the land is touched."""
-    range_ = ranges[where]
+    range_ = range_of(where)
     place = range_.space.place
     found = range_.margins(place) | range_.worst(place, ("multiplier", "film", "land force", "drag"))
     f, now = independent(range_, quantity, found[quantity]), float(jc.parameters(CASE)[name])
@@ -195,11 +192,11 @@ def test_gradients_of_requirements(name, where, quantity, step, tolerance, range
     assert found[quantity].slope[i] == pytest.approx(expected, rel=tolerance)
 
 
-def test_contact_is_forbidden_at_the_gap_of_each_design(ranges):
+def test_contact_is_forbidden_at_the_gap_of_each_design():
     """It begins at `onset` times the clearance of that design, which the gap changes."""
-    space, keep = ranges["calm"].space, listed(Requirements(land_force=0.0), CASE)
+    space, keep = range_of(CALM).space, listed(Requirements(land_force=0.0), CASE)
     place = space.place + np.array([0.25, 0.0])
-    found = ranges["calm"].worst(place, ("film", "contact"))
+    found = range_of(CALM).worst(place, ("film", "contact"))
     wider, onset = space.model(place), float(CASE.contact.onset)
     apart, slope = (x * keep[-1].size for x in keep[-1].slack(found["contact"]))
     assert apart == pytest.approx(found["film"].value - (1 - onset) * float(wider.clearance), abs=1e-12)

@@ -4,6 +4,8 @@ The points are edges of case 1a as found by a search over its speed range, round
 Newton's method finds them again.
 """
 
+import functools
+
 import numpy as np
 import pytest
 from helpers import edge_speed, in_other_units, preliminary, wide_but
@@ -39,17 +41,10 @@ def point(kind, speed_factor=1.0, state_factors=(1.0, 1.0)):
     return Point(kind, speed, scaled)
 
 
-class Found(dict):
-    """The sensitivity of each kind of edge, when it is asked for."""
-
-    def __missing__(self, kind):
-        self[kind] = sensitivity(CASE, point(kind), kind)
-        return self[kind]
-
-
-@pytest.fixture(scope="module")
-def found():
-    return Found()
+@functools.cache
+def found(kind):
+    """The sensitivity of an edge."""
+    return sensitivity(CASE, point(kind), kind)
 
 
 KINDS = wide_but(STATES, "period-doubling")
@@ -57,9 +52,9 @@ KINDS = wide_but(STATES, "period-doubling")
 
 @pytest.mark.wide
 @pytest.mark.parametrize("kind", KINDS)
-def test_edges_are_found_again(kind, found):
+def test_edges_are_found_again(kind):
     """From speed and state of six digits, on which the result does not depend."""
-    edge = found[kind]
+    edge = found(kind)
     assert edge.status == "converged" and edge.trusted and edge.kind == kind
     assert abs(edge.value_rpm - STATES[kind][0]) < 0.01
     assert abs(edge_speed(CASE, point(kind)) - jc.rpm(edge.value_rpm)) < 1e-12 * jc.rpm(edge.value_rpm)
@@ -68,18 +63,18 @@ def test_edges_are_found_again(kind, found):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_sensitivities_are_homogeneous(kind, found):
+def test_sensitivities_are_homogeneous(kind):
     """Whatever the units of mass, length and time, the same physics comes out."""
-    assert set(found[kind].homogeneity) == {"mass", "length", "time"}
-    for residual in found[kind].homogeneity.values():
+    assert set(found(kind).homogeneity) == {"mass", "length", "time"}
+    for residual in found(kind).homogeneity.values():
         assert abs(residual) < 1e-8
     values = jc.parameters(CASE)
-    for name, e in found[kind].elasticity.items():
-        slope = found[kind].derivative[name]
-        assert abs(slope * float(values[name]) / found[kind].value_rpm - e) < 1e-12
+    for name, e in found(kind).elasticity.items():
+        slope = found(kind).derivative[name]
+        assert abs(slope * float(values[name]) / found(kind).value_rpm - e) < 1e-12
     info = parameter_info(CASE)
     # The identity for mass, by hand: only these have a mass in their unit, and it is not that nothing depends on them.
-    heavy = {n: e for n, e in found[kind].elasticity.items() if "kg" in info[n].unit or "N" in info[n].unit}
+    heavy = {n: e for n, e in found(kind).elasticity.items() if "kg" in info[n].unit or "N" in info[n].unit}
     assert max(abs(e) for e in heavy.values()) > 0.4
 
 
@@ -96,39 +91,39 @@ MOVES += [(kind, name) for kind in ("Neimark-Sacker", "fold") for name in ("guid
 
 
 @pytest.mark.parametrize("kind, name", wide_but(MOVES, *QUICK))
-def test_derivatives_against_differences(kind, name, found):
+def test_derivatives_against_differences(kind, name):
     """Differences of fourth order, of edges located anew with the parameter changed; to one side of no pressure."""
     h, value = STEPS[name] / (10 if kind == "fold" else 1), float(jc.parameters(CASE)[name])
     shifts, weights = ((-2, -1, 1, 2), (1, -8, 8, -1)) if value else ((0, 1, 2), (-18, 24, -6))
     at = [edge_speed(jc.replace(CASE, **{name: value + i * h}), point(kind)) for i in shifts]
     slope = np.dot(weights, at) / (12 * h) * 30 / np.pi
-    np.testing.assert_allclose(found[kind].derivative[name], slope, rtol=1e-6 if value else 2e-6)
+    np.testing.assert_allclose(found(kind).derivative[name], slope, rtol=1e-6 if value else 2e-6)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_parameters_without_effect(kind, found):
+def test_parameters_without_effect(kind):
     """Exactly zero, and the others are not."""
     silent = NEVER | ZERO | (set() if kind == "fold" else CONTACT)
-    zero = {n for n, e in found[kind].elasticity.items() if e == 0.0}
+    zero = {n for n, e in found(kind).elasticity.items() if e == 0.0}
     assert zero == silent
     if kind == "fold":
-        assert found[kind].elasticity["onset"] < -1  # a later contact, a slower edge
+        assert found(kind).elasticity["onset"] < -1  # a later contact, a slower edge
 
 
 @pytest.mark.wide
 @pytest.mark.parametrize("base, factor", [("mass", 7.0), ("length", 1000.0), ("time", 60.0)])
 @pytest.mark.parametrize("kind", KINDS)
-def test_edges_in_other_units(kind, base, factor, found):
+def test_edges_in_other_units(kind, base, factor):
     """The speed is a rate: only the unit of time changes its number, and exactly."""
     length = factor if base == "length" else 1.0
     time = factor if base == "time" else 1.0
     other = point(kind, 1 / time, (length, length / time))
     speed = edge_speed(in_other_units(CASE, base, factor), other)
-    assert abs(speed * time / jc.rpm(found[kind].value_rpm) - 1) < 1e-10
+    assert abs(speed * time / jc.rpm(found(kind).value_rpm) - 1) < 1e-10
 
 
-def test_width_between_two_edges(found):
-    onset, leaves = found["Neimark-Sacker"], found["period-doubling"]
+def test_width_between_two_edges():
+    onset, leaves = found("Neimark-Sacker"), found("period-doubling")
     wide = width(onset, leaves)
     assert abs(wide.value_rpm - (leaves.value_rpm - onset.value_rpm)) < 1e-9
     assert wide.trusted and max(abs(r) for r in wide.homogeneity.values()) < 1e-8

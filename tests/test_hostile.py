@@ -63,8 +63,7 @@ def test_monsters(tmp_path: Path, given: str, said: str):
 
 
 @pytest.mark.parametrize(
-    "value",
-    ["!!python/object/apply:os.system ['true']", "0.4 __import__('os').system('true')", "$(true)", "{{ 7*7 }}"],
+    "value", ["!!python/object/apply:os.system ['true']", "0.4 __import__('os').system('true')", "$(true)", "{{ 7*7 }}"]
 )
 def test_a_configuration_cannot_run_code(tmp_path: Path, value: str):
     path = tmp_path / "design.toml"

@@ -29,11 +29,7 @@ def acceleration(tau, q, v, speed):
 def rates(tau, y, speed):
     """Forced van der Pol with a third, slower component."""
     x, u, z = y
-    return (
-        u,
-        1.5 * (1 - x**2) * u - x + 0.7 * jnp.cos(tau) + 0.3 * z,
-        -0.5 * z + jnp.sin(tau) * x**2,
-    )
+    return (u, 1.5 * (1 - x**2) * u - x + 0.7 * jnp.cos(tau) + 0.3 * z, -0.5 * z + jnp.sin(tau) * x**2)
 
 
 SECOND_ORDER = ForcedOscillator(acceleration, coordinates=2)
