@@ -17,10 +17,8 @@ from jaxcage.cli import main
 from jaxcage.files import ConfigError, load_model, read_bytes
 
 
-COMMANDS = (
-    "init check simulate sweep zones bifurcations gradient compare runup map study design sensitivity identify "
-    "poincare statics report"
-).split()
+COMMANDS = """check simulate sweep zones bifurcations gradient compare runup map study design sensitivity identify
+poincare statics report""".split()
 STUDY = "study 1a --vary speed=9000:12000:3"
 GAP = f"{STUDY} --vary guidance_gap"
 WEIGHTS = " ".join(f"--price {name}=0" for name in ("wear", "force", "impulse", "power", "slip", "balance"))
@@ -103,7 +101,7 @@ def test_bad_arguments(
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("command", [name for name in COMMANDS if name != "init"])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_nan_and_infinity_are_refused_in_every_option(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, command: str
 ):

@@ -133,10 +133,8 @@ def test_width_between_two_edges():
         elasticity = slope * float(jc.parameters(CASE)[name]) / wide.value_rpm
         np.testing.assert_allclose(wide.elasticity[name], elasticity, rtol=1e-9)
     assert wide.transversality == min(abs(onset.transversality), abs(leaves.transversality))
-    lines = str(wide).splitlines()
-    assert lines[0].startswith("width: unstable at 1243.017 ± ")
+    assert str(wide).startswith("width: unstable at 1243.017 ± ")
     assert wide.error_rpm == onset.error_rpm + leaves.error_rpm < 1e-3
-    assert len(lines) == 1 + sum(e != 0.0 for e in wide.elasticity.values())
 
 
 def test_edge_that_is_not_there():

@@ -92,15 +92,10 @@ def test_a_lane_does_not_depend_on_its_neighbours_or_threads():
 
 def test_a_lane_that_fails_leaves_its_neighbours_alone():
     """NaN, a start outside, and an oscillator that blows up in finite time."""
-
-    def law(tau: Any, q: Any, v: Any, speed: Any) -> Any:
-        return (q[0] ** 3 - 0.1 * v[0],)
-
-    system = jc.ForcedOscillator(law, coordinates=1)
+    system = jc.ForcedOscillator(lambda tau, q, v, speed: (q[0] ** 3 - 0.1 * v[0],), coordinates=1)
     initial_states = np.array([[[0.1, 0.0]], [[np.nan, 0.0]], [[3.0, 1.0]], [[-0.1, 0.0]]])
-    found = jc.sweep(
-        system, np.array([1.0, 1.1, 1.2, 1.3]), initial_states=initial_states, discard=0, revolutions=1, blocks=1
-    )
+    brief = dict(discard=0, revolutions=1, blocks=1)
+    found = jc.sweep(system, np.array([1.0, 1.1, 1.2, 1.3]), initial_states=initial_states, **brief)
     names = found.outcome.values[:, 0]
     assert names[0] == names[3] == "successful" and names[1] == "not_finite" and names[2] != "successful"
     assert np.all(np.isfinite(found.last.values[[0, 3]])) and np.all(np.isnan(found.last.values[[1, 2]]))

@@ -5,11 +5,10 @@ rotation from u to v, as our x and y with the load along -y: their matrices are 
 (`CylindricalBearing`) prints. Half a turn of both axes changes nothing.
 """
 
-import equinox as eqx
 import jax
 import numpy as np
 import pytest
-from helpers import preliminary
+from helpers import preliminary, unforced
 from scipy.optimize import brentq
 from short_bearing import (
     LARGEST_WHIRLING,
@@ -22,7 +21,7 @@ from short_bearing import (
 
 from jaxcage import replace
 from jaxcage.analysis import measures
-from jaxcage.forces import RibFilm, film_scale
+from jaxcage.forces import film_scale
 from jaxcage.solve import simulate
 
 
@@ -105,19 +104,12 @@ def test_eigenvalues_cross_the_axis_at_rouths_threshold(eps):
             assert np.sign(worst.real) == sign and abs(worst.real) > 1e-6
 
 
-def cage_in_film(film, **changes):
-    """A cage in its film alone, without unbalance."""
-    names = ("stiffness_x", "stiffness_y", "damping", "cubic_stiffness", "cross_stiffness", "eccentricity", "amplitude")
-    model = replace(preliminary("1a"), **(dict.fromkeys(names, 0.0) | changes))
-    return eqx.tree_at(lambda m: m.film, model, RibFilm(model.film.land_width, model=film))
-
-
 @pytest.mark.wide
 @pytest.mark.parametrize("film", ["fixed_half", "positive_pressure"])
 @pytest.mark.parametrize("factor", [0.99, 1.01])
 def test_simulated_whirl_decays_and_grows_as_the_eigenvalues_say(factor, film):
     """A push of 1e-3 c from the equilibrium, within 1 % of the threshold: rate, and whirl between 0.500 and 0.524."""
-    model = cage_in_film(film, cage_mass=0.02)
+    model = replace(unforced(preliminary("1a")), cage_mass=0.02, **{"film.model": film})
     c, law = float(model.clearance), model.film
     size = law.n_lands * float(film_scale(model.lubricant.dynamic_viscosity, model.land_radius, law.land_width, c))
     number = lambda speed: float(model.cage_mass) * 9.81 / (size * speed)
