@@ -88,7 +88,6 @@ def test_wrong_arguments_get_a_sentence(call: Callable[[], Any], said: str):
         lambda: jc.ramp(CASE, 900.0, 9000.0, revolutions=1),
         lambda: jc.periodic_orbit(CASE, 9000.0),
     ],
-    ids=["sweep", "simulate", "ramp", "periodic_orbit"],
 )
 def test_revolutions_per_minute_for_radians_are_refused(run):
     with pytest.raises(ValueError, match=r"must be in rad/s .* but 9000 was given, .* `jaxcage.rpm\(9000\)`"):
@@ -105,7 +104,6 @@ def exponent(gap):
         lambda: jax.grad(exponent)(4.5e-4),
         lambda: jax.vmap(lambda w: jc.simulate(CASE, w, revolutions=1).state)(jnp.array([900.0, 950.0])),
     ],
-    ids=["grad of a sweep", "vmap of a simulation"],
 )
 def test_what_steers_by_its_findings_says_what_to_call_instead(run):
     with pytest.raises(ValueError, match="must be known numbers, but are traced by .*`jaxcage.sweep"):

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numcodecs.pickles
 import numpy as np
 import pytest
 import xarray as xr
 import zarr
+from laws import hardening
 from report_example import swept
 
 import jaxcage as jc
@@ -83,16 +83,11 @@ def test_a_full_disk_leaves_what_was_there(tmp_path: Path, name: str):
     assert contents(tmp_path) != before and len(contents(tmp_path)) == len(before)
 
 
-def _duffing(tau: Any, q: Any, v: Any, speed: Any) -> tuple[Any]:
-    (x,), (u,) = q, v
-    return (-0.2 * u - x - x**3 + 0.3 * jnp.cos(tau),)
-
-
 @pytest.mark.wide
 def test_a_study_on_a_full_disk_goes_on(tmp_path: Path):
     """Out of room at once, or after some of its chunks: called again, it ends with the files of an unbroken study."""
     grid = Grid({"speed": np.linspace(1.1, 1.9, 12)}, {}, 0, 0, 2, 6)
-    system = jc.ForcedOscillator(_duffing, coordinates=1)
+    system = hardening(d=0.2)
     length = dict(discard=10, revolutions=10, blocks=5, exponents=1, confirm=False, horizon=0)
     run = Run.of(system, method=jc.method("rk4", steps=32), **length)
     study = Study(system, grid, run, "duffing", "1")

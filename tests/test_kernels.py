@@ -216,3 +216,14 @@ def test_bad_settings(arguments, sentence):
 
 
 # --- the engine ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.wide
+def test_several_designs_in_one_batch_give_what_each_gives_alone():
+    models, speeds = [MODEL, jc.replace(MODEL, guidance_gap=0.5e-3), preliminary("2b")], jc.rpm(8000, 24000, 5)
+    options = dict(discard=2, revolutions=2, blocks=1, keep=2)  # chaos doubles rounding every few revolutions
+    together = raw_sweep(models, speeds, **options)
+    for i, model in enumerate(models):
+        got, alone = together.isel(design=i), raw_sweep(model, speeds, **options)
+        np.testing.assert_array_equal(got.outcome, alone.outcome)
+        np.testing.assert_allclose((got.strobe / got.scale).values, (alone.strobe / alone.scale).values, atol=1e-6)
