@@ -102,22 +102,6 @@ def even(model: jc.CageModel) -> jc.CageModel:
     return EvenSteps(**{field.name: getattr(model, field.name) for field in dataclasses.fields(model)})
 
 
-def unforced(model: jc.CageModel) -> jc.CageModel:
-    """Film, contact and weight only: no support, no impact, no unbalance."""
-    zero = (
-        "stiffness_x",
-        "stiffness_y",
-        "support.damping",
-        "cubic_stiffness",
-        "cross_stiffness",
-        "amplitude",
-        "eccentricity",
-    )
-    names = jc.parameters(model)
-    chosen = [n if n in names else n.split(".")[-1] for n in zero]
-    return jc.replace(model, **{n: jnp.zeros(()) for n in chosen})
-
-
 class DoubleWell(eqx.Module):
     """m x'' + d x' - k x + b x^3 = g cos(w t), whose small orbit ends in a fold and in a period doubling."""
 
@@ -189,6 +173,18 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 def is_png(path: str) -> bool:
     """True for a file that begins as a PNG figure does."""
     return Path(path).read_bytes().startswith(b"\x89PNG\r\n")
+
+
+CRITICAL = {"period-doubling": -1.0, "Neimark-Sacker": np.exp(2.5j), "fold": 1.0}
+"""Multipliers that cross the unit circle."""
+
+
+def point(kind: str, rpm: float, index: int = 0, edge: bool = True, state: tuple[float, ...] = (1e-5, 2e-5, 0.1, 0.2)):
+    """A bifurcation made by hand, on a branch next to the orbit with an index."""
+    y, second = np.array(state), np.conj(CRITICAL[kind]) if kind == "Neimark-Sacker" else 0.5
+    mu = np.array([CRITICAL[kind], second, 0.2, 0.1], dtype=complex)[: y.size]
+    known = dict(multipliers=mu, index=index, edge=edge, steps=1024, error=1e-4 * np.pi / 30, outcome=0)
+    return jc.Point(kind, rpm * np.pi / 30, y, **known)
 
 
 def made_sweep(

@@ -4,12 +4,12 @@ import json
 
 import numpy as np
 import xarray as xr
-from helpers import made_sweep
+from helpers import made_sweep, point
 
 import jaxcage as jc
 from jaxcage.analysis import zones
 from jaxcage.bearing import PUBLISHED_CASES
-from jaxcage.orbits import Branch, Point, Sensitivity, StableRange, SynchronousOrbits, unstable_ranges
+from jaxcage.orbits import Branch, Sensitivity, StableRange, SynchronousOrbits, unstable_ranges
 from jaxcage.show import (
     Section,
     drawn,
@@ -33,15 +33,6 @@ def settled(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.full(points.shape, 512), np.full(points.shape, 1e-7)
 
 
-def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = True) -> Point:
-    """A bifurcation of a 4-dimensional system."""
-    others = [complex(critical).conjugate(), 0.5] if kind == "Neimark-Sacker" else [0.5, 0.4]
-    mu = np.array([critical, *others, 0.1], dtype=complex)
-    state = np.array([1e-5, 2e-5, 0.1, 0.2])
-    known = dict(multipliers=mu, index=index, edge=edge, steps=1024, error=1e-4 * PER_RPM, outcome=0)
-    return Point(kind, rpm * PER_RPM, state, **known)
-
-
 def swept(first: float = 2500.0, last: float = 27500.0, count: int = 251) -> xr.Dataset:
     """Three initial states: chaotic from 9050 to 12050 and from 20050 rpm on, calm elsewhere."""
     rpm = np.linspace(first, last, count)
@@ -58,9 +49,9 @@ def orbits(sweep: xr.Dataset) -> SynchronousOrbits:
     """One orbit that is lost from 7000 to 12000 rpm and from 20000 rpm on."""
     rpm = np.linspace(2500.0, 27500.0, 101)
     special = (
-        point("fold", 7000.0, 1.0, 17),
-        point("period-doubling", 12000.0, -1.0, 37),
-        point("Neimark-Sacker", 20000.0, np.exp(2.0j), 69),
+        point("fold", 7000.0, 17),
+        point("period-doubling", 12000.0, 37),
+        point("Neimark-Sacker", 20000.0, 69),
     )
     stable = (rpm < 7000) | ((rpm > 12000) & (rpm < 20000))
     state = np.column_stack([np.full(101, 1e-5), 1e-4 * np.sin(rpm / 5e3), np.full(101, 0.1), np.full(101, 0.2)])

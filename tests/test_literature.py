@@ -67,35 +67,8 @@ def test_ensembles_find_the_exponents_of_the_table(index: int):
     assert error < 6e-4 and abs(found - number.value) < number.tolerance + 3 * error
 
 
-# A linear oscillator, whose multipliers are exp((-z +- sqrt(z^2 - 1)) w_0 T).
-
-
-def spectrum(law, omega, steps=256, **options):
-    settings = dict(discard=20, revolutions=100, exponents=2, blocks=20)
-    oscillator = jc.ForcedOscillator(law, coordinates=1)
-    chosen = jc.method("rodas4", steps=steps)
-    return jc.sweep(oscillator, np.array([omega]), method=chosen, **(settings | options))
-
-
 def linear(zeta, natural):
-    def acceleration(tau, q, v, speed):
-        (x,), (u,) = q, v
-        return (-2 * zeta * natural * u - natural**2 * x + jnp.cos(tau),)
-
-    return acceleration
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("omega", [0.4, 1.7])
-def test_multipliers_of_the_linear_oscillator_underdamped(omega):
-    """exp((-z +- i sqrt(1 - z^2)) w_0 T): both exponents are -z w_0 T in the mean."""
-    zeta, natural = 0.05, 1.3
-    result = spectrum(linear(zeta, natural), omega, discard=50, revolutions=400, blocks=4)
-    decay = -zeta * natural * 2 * np.pi / omega
-    np.testing.assert_allclose(np.sum(result.exponents, axis=-1), 2 * decay, atol=1e-7)
-    # The tangent vectors turn: over n revolutions what is left of it is of the order of 1/n.
-    np.testing.assert_allclose(result.exponents, decay, atol=2 / 400)
-    assert np.all(result.label == "periodic-1")
+    return lambda tau, q, v, speed: (-2 * zeta * natural * v[0] - natural**2 * q[0] + jnp.cos(tau),)
 
 
 def test_error_of_an_exponent_whose_growth_oscillates_in_step_with_the_blocks():
@@ -114,12 +87,12 @@ UNDERSTATED = pytest.mark.xfail(reason="the error stated of an exponent of -24 a
 @pytest.mark.wide
 @pytest.mark.parametrize("omega", [pytest.param(0.9, marks=UNDERSTATED), 3.0])
 def test_multipliers_of_the_linear_oscillator_overdamped(omega):
-    """Real multipliers exp((-z +- sqrt(z^2 - 1)) w_0 T), one exponent each."""
+    """Real multipliers exp((-z +- sqrt(z^2 - 1)) w_0 T), one exponent each; `test_engine` has the underdamped one."""
     zeta, natural = 1.5, 1.3
-    result = spectrum(linear(zeta, natural), omega)
-    period = 2 * np.pi / omega
+    settings = dict(discard=20, revolutions=100, exponents=2, blocks=20, method=jc.method("rodas4", steps=256))
+    result = jc.sweep(jc.ForcedOscillator(linear(zeta, natural), coordinates=1), np.array([omega]), **settings)
     roots = np.array([-zeta + np.sqrt(zeta**2 - 1), -zeta - np.sqrt(zeta**2 - 1)])
-    exact = np.broadcast_to(roots * natural * period, result.exponents.shape)
+    exact = np.broadcast_to(roots * natural * 2 * np.pi / omega, result.exponents.shape)
     np.testing.assert_allclose(result.exponents, exact, rtol=1e-7)
     # Nothing scatters: what is stated is the error of the steps, which it covers.
     assert np.all(result.standard_error < 1e-6 * np.abs(exact))

@@ -1,6 +1,5 @@
 """Viscosity of oils: ASTM D341 and D2270 against published values."""
 
-import jax
 import numpy as np
 import pytest
 
@@ -28,26 +27,9 @@ def test_walther_against_published_extrapolations(first, second, target, publish
     assert float(found) * 1e6 == pytest.approx(published, rel=tolerance)
 
 
-@pytest.mark.parametrize("temperature, viscosity", [(313.15, 56e-6), (373.15, 7.5e-6)])
-def test_walther_passes_through_both_points(temperature, viscosity):
-    found = jb.Lubricant(870.0, 56e-6, 313.15, 7.5e-6, 373.15, temperature).kinematic_viscosity
-    assert float(found) == pytest.approx(viscosity, rel=1e-14)
-
-
 @pytest.mark.parametrize("grade, viscosity", [(32, 0.0278), (56, 0.0487), (78, 0.0679)])
 def test_dynamic_viscosity_of_the_published_oils(grade, viscosity):
-    oil = jb.vg(grade)
-    assert float(oil.dynamic_viscosity) == pytest.approx(870 * grade * 1e-6, rel=1e-14)
-    assert float(oil.dynamic_viscosity) == pytest.approx(viscosity, abs=5e-5)
-
-
-@pytest.mark.parametrize("second", [5e-6, 7.54e-6, 12e-6])
-def test_second_point_has_no_influence_at_40_celsius(second):
-    def viscosity(nu):
-        return jb.Lubricant(870.0, 56e-6, 313.15, nu, 373.15).dynamic_viscosity
-
-    assert float(viscosity(second)) == pytest.approx(0.04872, rel=1e-14)
-    assert float(jax.grad(viscosity)(second)) == 0.0
+    assert float(jb.vg(grade).dynamic_viscosity) == pytest.approx(viscosity, abs=5e-5)
 
 
 # ASTM D2270: L and H as quadratics of the viscosity at 100 C [mm^2/s], with the range of each.
@@ -80,16 +62,6 @@ def test_oils_by_grade_have_a_viscosity_index_of_about_95(grade):
     assert viscosity_index(grade, nu_100) == pytest.approx(95, abs=1.5)
 
 
-def test_viscosity_falls_with_temperature_as_differences_say():
-    def viscosity(temperature):
-        return jb.vg(56.0, temperature).dynamic_viscosity
-
-    slope = jax.grad(viscosity)(350.0)
-    difference = (viscosity(350.01) - viscosity(349.99)) / 0.02
-    assert float(slope) < 0
-    assert float(slope) == pytest.approx(float(difference), rel=1e-6)
-
-
 def test_an_oil_thinner_than_its_law_allows_is_doubted():
     assert jb.vg(32, celsius(100)).doubts() == []
     assert jb.Lubricant(870.0, 2e-6, 313.15, 1e-6, 373.15).doubts() == []
@@ -111,7 +83,3 @@ def test_impossible_oils(oil, said):
 def test_a_part_of_a_model_is_compared_when_its_numbers_are_replaced():
     with pytest.raises(ValueError, match="must not rise with the temperature"):
         jaxcage.replace(jaxcage.case("1a"), viscosity_2=1e-4)
-
-
-def test_an_oil_of_constant_viscosity():
-    assert float(jb.Lubricant(870.0, 2e-5, 313.15, 2e-5, 373.15).kinematic_viscosity) == pytest.approx(2e-5, rel=1e-12)

@@ -1,7 +1,6 @@
-"""Derivatives of orbits, multipliers and bifurcation points: against differences of results found anew, and identities.
+"""Derivatives of orbits, multipliers and bifurcation points: against differences of results found anew.
 
-One law serves all: m x'' + (d + c x^2) x' - k x + b x^3 = g cos(w t). Scaling x, scaling t and multiplying the equation
-by a number leave its orbits alone, which gives exact relations between derivatives.
+One law serves all: m x'' + (d + c x^2) x' - k x + b x^3 = g cos(w t).
 """
 
 import equinox as eqx
@@ -135,23 +134,6 @@ def test_gradient_of_a_point(kind, found):
     # What is solved for has no influence.
     free = "w" if kind == "fold" else "g"
     assert gradient[NAMES.index(free)] == 0.0
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("kind", POINTS)
-def test_scaling_identities_of_a_point(kind, found):
-    theta, (point, guess) = POINTS[kind][1], found[kind]
-    m, d, c, k, b, g, w = theta
-    slope = dict(zip(NAMES, np.asarray(EDGE_GRADIENT(jnp.asarray(theta), kind, guess)), strict=True))
-    value = float(point.value)
-    force, speed = (g * slope["g"], -value) if kind == "fold" else (-value, w * slope["w"])
-    # x in other units: only b g^2 and c g^2 matter.
-    assert abs(2 * b * slope["b"] + 2 * c * slope["c"] - force) < 1e-9
-    # Time in other units.
-    assert abs(2 * m * slope["m"] + d * slope["d"] + c * slope["c"] - speed) < 1e-9
-    # The equation multiplied by a number.
-    total = sum(x * slope[name] for name, x in zip(NAMES[:5], theta, strict=False))
-    assert abs(total + force) < 1e-9
 
 
 @pytest.mark.wide

@@ -188,28 +188,6 @@ def point_of(kind, a=0.93, speed=1.1, **settings):
     return jc.bifurcation(system, kind, ((0.99, 0.01), a), "a", speed=speed, method=METHOD)
 
 
-@pytest.mark.wide
-@pytest.mark.parametrize("turn", [0.0, 0.5])
-def test_neutral_saddle_is_no_torus_bifurcation(turn):
-    """Real multipliers mu and 1/mu (at a = 1.15): their product is 1, too."""
-    point = point_of("Neimark-Sacker", a=1.12, s=0.3, turn=turn)
-    assert point.status == "other kind"
-    assert not bool(point.converged) and not bool(point.trusted)
-    assert np.isnan(point.value) and np.isnan(point.angle) and np.all(np.isnan(point.state))
-    exact = np.exp(np.array([0.15, -0.15]) * 2 * np.pi / 1.1) * (1 - 4 * turn if turn else 1)
-    np.testing.assert_allclose(point.multipliers, exact, rtol=1e-7)
-
-
-@pytest.mark.wide
-def test_branch_point():
-    """A pitchfork: the multiplier exp(g T) crosses 1 at a = 1."""
-    system = planted(a=0.93, s=0.3, turn=0.0)
-    branch = jc.branch(system, ((0.99, 0.01), 0.93), "a", lower=0.9, upper=1.1, speed=1.1, method=METHOD)
-    (point,) = branch.special
-    assert point.kind == "branch-point" and point.status == "converged" and abs(point.value - 1) < 1e-8
-    np.testing.assert_allclose(point.multipliers, [1.0, np.exp(-0.3 * 2 * np.pi / 1.1)], rtol=1e-6)
-
-
 TANGENT = {"hardly crosses": dict(slope=1e-4, bend=1.0), "touches": dict(slope=0.0, touch=-1.0)}
 CRITICAL = {"period-doubling": dict(s=0.3), "Neimark-Sacker": dict(b=0.3)}
 

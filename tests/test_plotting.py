@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 import xarray as xr
-from helpers import cage_sweep
+from helpers import cage_sweep, point
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, QuadMesh
 from matplotlib.colors import to_rgb
@@ -98,15 +98,11 @@ def test_time_history_and_orbit(elastic: bool):
 
 # Branches, multipliers, elasticities, curves.
 
-CRITICAL = {"period-doubling": -1.0, "Neimark-Sacker": np.exp(2.5j), "fold": 1.0}
 T = np.linspace(-2.0, 2.0, 40)
 
 
 def special(kind: str, rpm: float, y: float, index: int, edge: bool) -> Point:
-    second = np.conj(CRITICAL[kind]) if kind == "Neimark-Sacker" else 0.5
-    mu, state = np.array([CRITICAL[kind], second, 0.2, 0.1], dtype=complex), np.array([0.0, y, 0.0, 0.0])
-    known = dict(multipliers=mu, index=index, edge=edge, steps=1024, error=1e-4 * PER_RPM, outcome=0)
-    return Point(kind, rpm * PER_RPM, state, **known)
+    return point(kind, rpm, index, edge, state=(0.0, y, 0.0, 0.0))
 
 
 def branch_of(rpm: np.ndarray, y: np.ndarray, stable: np.ndarray, points: list[Point], mu=None) -> Branch:

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 import reference
 from helpers import wide_but
-from reference._land import pressurised_half
-from scipy.integrate import quad
 
 import jaxcage as jc
 from jaxcage.forces import pulse_spectrum
@@ -21,10 +19,12 @@ def as_state(y):
     return tuple(map(jnp.asarray, y))
 
 
-@pytest.mark.parametrize(
-    "wide, seeds", wide_but([(False, (0, 1, 2)), (False, range(3, 10)), (True, range(10))], (False, (0, 1, 2)))
-)
+FIRST = False, (0, 1, 2, 3, 10)
+
+
+@pytest.mark.parametrize("wide, seeds", wide_but([FIRST, (False, range(4, 10)), (True, range(10))], FIRST))
 def test_accelerations_of_random_models_inside_and_in_contact(wide, seeds):
+    """The first few have every film, reading and form of support, an elastic rib, and impacts of both kinds."""
     for seed in seeds:
         model, speed = reference.random_model(seed, wide), reference.random_speeds(seed, 1, wide)[0]
         ours, theirs = model.at_speed(jnp.asarray(speed)), reference.field(model, speed)
@@ -36,49 +36,6 @@ def test_accelerations_of_random_models_inside_and_in_contact(wide, seeds):
                 part = slice(theirs.coordinates + k, theirs.coordinates + k + 2)
                 size = np.linalg.norm(expected[part])
                 np.testing.assert_allclose(found[part], expected[part], rtol=0, atol=1e-9 * size, err_msg=f"{seed} {y}")
-
-
-def pressure_force(model, eps, eps_rate, phi_rate):
-    """(26) over the pressurised arc by quadrature: radial and tangential force in units mu omega R L^3/c^2."""
-    drive = lambda a: (1 - 2 * phi_rate) * eps * math.sin(a) - 2 * eps_rate * math.cos(a)
-    pressure = lambda a: 3 * (1 / 4 - 1 / 12) * drive(a) / (1 + eps * math.cos(a)) ** 3
-    zero = math.atan2(2 * eps_rate, (1 - 2 * phi_rate) * eps)
-    first, last = {"fixed_half": (0, math.pi), "full": (0, 2 * math.pi)}.get(model, (zero, zero + math.pi))
-    # The widest gap is opposite the cage's displacement, and pressure there pushes the cage back.
-    radial = quad(lambda a: pressure(a) * math.cos(a), first, last, epsabs=1e-12)[0]
-    tangential = quad(lambda a: pressure(a) * math.sin(a), first, last, epsabs=1e-12)[0]
-    return radial, tangential
-
-
-# The physics page, section 4: (eps, eps', phi') and the forces of the three films.
-PRINTED = {
-    (0.5, 0.0, 0.0): ((-0.444444, 0.604600), (-0.444444, 0.604600), (0.0, 1.209200)),
-    (0.5, 0.1, 0.0): ((-0.928124, 0.782378), (-1.069483, 0.764804), (-0.967360, 1.209200)),
-    (0.5, 0.1, 0.5): ((-0.483680, 0.177778), (-0.911573, 0.0), (-0.967360, 0.0)),
-}
-
-
-@pytest.mark.parametrize("point", [*PRINTED, (0.93, -0.2, 0.3), (0.2, 0.05, -0.4), (0.97, 0.3, 0.49)])
-def test_films_are_the_quadrature_of_their_pressure(point):
-    eps, eps_rate, phi_rate = point
-    for i, model in enumerate(("fixed_half", "positive_pressure", "full")):
-        expected = pressure_force(model, *point)
-        if model == "positive_pressure":
-            found = pressurised_half(eps, 0.0, 2 * eps_rate, (2 * phi_rate - 1) * eps, 0.0)
-        else:
-            found = reference.film_in_polar(model, eps, eps_rate, (1 - 2 * phi_rate) * eps)
-        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
-        if point in PRINTED:
-            np.testing.assert_allclose(found, PRINTED[point][i], rtol=0, atol=2e-6)
-
-
-def test_restitution_of_the_reference_is_that_of_a_bounce():
-    """m dv/dt = -K p^(10/9) (1 + chi v/v0): the contact takes up as much between v0 and 0 as it gives back to -e v0."""
-    for e in (0.05, 0.5, 0.9, 0.999142):
-        chi = reference.hunt_crossley_number(e)
-        inward = quad(lambda v: v / (1 + chi * v), 0, 1, epsabs=1e-14)[0]
-        outward = quad(lambda v: v / (1 - chi * v), 0, e, epsabs=1e-14)[0]
-        assert inward == pytest.approx(outward, rel=1e-9)
 
 
 @pytest.mark.wide

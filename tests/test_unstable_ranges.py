@@ -2,24 +2,16 @@
 
 import numpy as np
 import pytest
-from helpers import made_sweep
+from helpers import made_sweep, point
 from laws import hardening as hardening_law
 from literature import DUFFING_FOLDS
 
 import jaxcage as jc
-from jaxcage.orbits import Point, StableRange, SynchronousOrbits
+from jaxcage.orbits import StableRange, SynchronousOrbits
 
 
 METHOD = jc.method("rodas4", steps=256)
 PER_RPM = np.pi / 30
-CRITICAL = {"period-doubling": -1.0, "Neimark-Sacker": np.exp(2.5j), "fold": 1.0}
-
-
-def special(rpm, kind="fold"):
-    pair = [CRITICAL[kind], np.conj(CRITICAL[kind]) if kind == "Neimark-Sacker" else 0.5]
-    speed = rpm * PER_RPM
-    known = dict(multipliers=np.array(pair, dtype=complex), index=0, edge=True, steps=1024, error=1e-4 * PER_RPM)
-    return Point(kind, speed, np.zeros(2), **known, outcome=0)
 
 
 def stretch(
@@ -27,8 +19,8 @@ def stretch(
 ):
     """A stretch between two speeds [rpm], of a branch with the number of its family."""
     return StableRange(
-        None if open_below else special(lower, kinds[0]),
-        None if open_above else special(upper, kinds[1]),
+        None if open_below else point(kinds[0], float(lower), state=(0.0, 0.0)),
+        None if open_above else point(kinds[1], float(upper), state=(0.0, 0.0)),
         float(lower),
         float(upper),
         family,

@@ -33,7 +33,8 @@ def test_simulate(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path, mi
     measures = found["measures"]
     parts = [x for name, x in measures.items() if name.startswith("power_") and name.endswith("_W")]
     assert measures["friction_power_W"] == pytest.approx(sum(parts))
-    assert is_png(found["figure"]) and "pocket_force_13 [N]" in read_columns(found["data"])
+    assert is_png(found["figure"]) and read_columns(found["data"])["pocket_force_13 [N]"].size == 129
+    assert len(found["around"]["roller_slip"]) == 36
     model = jc.whole_bearing("nu2310")
     expected = jc.measures(model, jc.simulate(model, SPEED, revolutions=1, samples=128))
     for name in ("cage_slip", "pocket_force_mean_sum_N", "eccentricity_mean"):
@@ -135,6 +136,7 @@ def test_init(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     assert json.dumps(document(capsys, "init", str(path), "--model", "bearing")) == json.dumps({"file": str(path)})
     assert isinstance(load_model(path), jc.BearingModel)
     assert "takes a cage" in refused(capsys, "poincare", str(path), "--speed", "1e4")
+    assert "--solver" in refused(capsys, "simulate", str(path), "--speed", "1e4", "--solver", "rk4")
 
 
 def test_speeds_of_the_cage_with_a_turning_outer_ring(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):

@@ -5,14 +5,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from energies import contact_energy
 from helpers import in_other_units, unit_exponents
 from jax.flatten_util import ravel_pytree
 from reference import WholeBearing, gupta
 from test_whole_reference import SPEED, everything, random_state, right_side
 
 import jaxcage as jc
-from jaxcage.bearing import bar_stiffness, vg
+from jaxcage.bearing import vg
 from jaxcage.models import BearingState, Traction
 from jaxcage.models.contacts import lambert_w
 
@@ -218,25 +217,3 @@ def test_traction_falls_with_the_viscosity():
             expected = roelands(cold, pressure) / film(cold) / (roelands(warm, pressure) / film(warm))
             assert slope(cold / warm) / slope(1.0) == pytest.approx(expected, rel=0.1), (pressure, celsius)
         assert slope(1.0) == float(jax.grad(lambda u: Traction().at()(u))(0.0))
-
-
-def test_energy_of_a_contact_is_the_work_of_its_force():
-    from scipy.integrate import quad
-
-    from jaxcage.forces import power_10_9, smooth_plus
-
-    width = 2e-7
-    force = jax.jit(lambda x: power_10_9(smooth_plus(x, width)))
-    for overlap in (-1e-7, 0.0, 1.5e-7, 3e-6):
-        points = [p for p in (-width, width) if p < overlap]
-        expected = quad(lambda x: 1e9 * float(force(x)), -width, overlap, points=points, epsabs=0, epsrel=1e-10)[0]
-        found = 1e9 * float(contact_energy(overlap, width))
-        assert found == pytest.approx(expected, rel=1e-8)
-
-
-def test_stiffness_of_a_bar():
-    """Clamped at both ends under an even load w: its middle sinks by w l^4/(384 E I)."""
-    modulus, length, thickness, height = 102e9, 27e-3, 3e-3, 8.3e-3
-    sag = length**3 / (384 * modulus * height * thickness**3 / 12)  # under a load of 1 N
-    assert float(bar_stiffness(modulus, length, thickness, height)) == pytest.approx(1 / sag, rel=1e-12)
-    assert float(bar_stiffness(modulus, length, thickness, height, 1 / sag)) == pytest.approx(0.5 / sag, rel=1e-12)

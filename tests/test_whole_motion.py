@@ -1,7 +1,5 @@
-"""The whole bearing in motion: rolling, static load, energy, angular momentum, bounces, the cage alone; the command."""
+"""The whole bearing in motion: rolling, static load, energy, angular momentum, bounces, skidding."""
 
-import json
-import pathlib
 from typing import Any
 
 import equinox as eqx
@@ -9,16 +7,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from energies import cage_angular_momentum, kinetic_energy, potential_energy
-from helpers import beyond_range, read_columns
+from helpers import beyond_range
 from jax.flatten_util import ravel_pytree
-from PIL import Image
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 from test_whole_reference import everything
 
 import jaxcage as jc
-from jaxcage.cli import main
-from jaxcage.models import INTEGRATED, LEDGER, BearingState, Bodies, Rollers, roller_history, rolling_start, state_scale
+from jaxcage.models import LEDGER, BearingState, Bodies, Rollers, roller_history, rolling_start, state_scale
 
 
 SPEED = jc.rpm(10000)
@@ -246,47 +242,6 @@ def test_bounces():
         assert -after / before == pytest.approx(e, abs=1e-6)
 
 
-def cage_alone():
-    """A bearing without pockets that holds the cage's speed, and the cage model without support and impact."""
-    same = bearing(
-        **{"cage_rotation": "held", "pocket_stiffness": 0.0, "palmgren_constant": 1e-3, "land_friction": 0.0}
-    )
-    none = dict.fromkeys(("stiffness_x", "stiffness_y", "damping", "cubic_stiffness", "cross_stiffness"), 0.0)
-    cage = jc.CageModel(
-        bearing=jc.bearing.nu2310(),
-        lubricant=same.lubricant,
-        forces=(
-            same.film,
-            same.contact,
-            jc.forces.Support(**none),
-            jc.forces.SynchronousImpact(amplitude=0.0, exponent=1.0),
-        ),
-        cage_mass=same.cage_mass,
-        guidance_gap=same.guidance_gap,
-        eccentricity=same.eccentricity,
-        clearance_reading="radial",
-        unbalance="physical",
-    )
-    return same, cage
-
-
-@pytest.mark.wide
-def test_held_cage_is_that_of_the_cage_model():
-    held, cage = cage_alone()
-    omega, c = 450.0, float(held.clearance)
-    field = eqx.filter_jit(lambda tau, y: cage.at_speed(jnp.asarray(omega))(tau, y))
-    for x, y, vx, vy, tau in ((0.4, 0.3, 0.1, -0.2, 0.7), (-0.2, -0.96, 0.3, 0.1, 3.0), (0.1, 0.99, -0.1, 0.4, 5.0)):
-        place = np.array([x, y, vx * omega, vy * omega]) * c
-        expected = omega * np.array(field(jnp.asarray(tau), tuple(map(jnp.asarray, place))))
-        start = moving(held, cage_speed=omega, x=place[0], y=place[1], vx=place[2], vy=place[3])
-        start = start._replace(clock=jnp.array([tau, 0.0]))
-        _, rates = everything(held, jnp.asarray(SPEED), start)
-        found = np.asarray(rates.state.bodies)
-        np.testing.assert_allclose(found[:4], expected, rtol=0, atol=1e-13 * np.abs(expected).max())
-        torque = float(rates.integrals[INTEGRATED.index("hold_torque")])
-        assert found[4] == 0 and abs(torque) > 1e-3
-
-
 def test_steps_that_are_too_long_are_said():
     """A tolerance that lets errors through, and none allowed: the run is done and called inaccurate."""
     model = bearing()
@@ -333,62 +288,3 @@ def test_preload_prevents_skidding():
         loads[clearance] = roller_history(model, ran).inner_load.min()
     assert slips[40e-6] > 0.2 and abs(slips[-10e-6]) < 2e-3
     assert loads[40e-6] == 0 and loads[-10e-6] > 100
-
-
-@pytest.mark.slow
-def test_a_lightly_loaded_bearing_skids():
-    """At 100 N the slip passes 5 %; at 4450 N it stays below 2 %."""
-    slips = {}
-    for load in (100.0, 4450.0):
-        model = bearing(load=load)
-        ran = jc.simulate(model, SPEED, revolutions=20, discard=10, samples=32)
-        assert ran.outcome == "successful"
-        slips[load] = jc.measures(model, ran).value("cage_slip")
-    assert slips[100.0] > 0.05 and 0.005 < slips[4450.0] < 0.02
-
-
-def test_simulate_prints_slips_forces_and_losses(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
-    """Run of a file, at a load of the command line; figure and data beside it."""
-    path = tmp_path / "mine.toml"
-    path.write_text('base = "nu2310"\nload = "300 N"')
-    asked = [
-        "simulate",
-        str(path),
-        "--speed",
-        "10000 rpm",
-        "--load",
-        "4.45 kN",
-        "--revolutions",
-        "1",
-        "--discard",
-        "0",
-        "--json",
-    ]
-    assert main([*asked, "--out", str(tmp_path)]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["outcome"] == "successful" and found["shaft_speed_rpm"] == 10000 and found["load_N"] == 4450
-    assert len(found["around"]["roller_slip"]) == 36
-    with Image.open(found["figure"]) as picture:
-        assert picture.size == (2400, 1600)
-    assert len(read_columns(found["data"])["pocket_force_13 [N]"]) == 129
-    run = jc.simulate(jc.whole_bearing("nu2310"), jc.rpm(10000), revolutions=1, samples=128)
-    expected = jc.measures(jc.whole_bearing("nu2310"), run)
-    assert found["measures"] == pytest.approx({name: each.value for name, each in expected.items()}, rel=1e-12)
-
-
-def test_speed_of_the_cage(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
-    cage = float(jc.whole_bearing("nu2310").rolling_cage_speed(1e4))
-    asked = ["simulate", "nu2310", "--speed", f"{cage!r} rpm cage", "--revolutions", "1", "--discard", "0", "--json"]
-    assert main([*asked, "--out", str(tmp_path)]) == 0
-    assert json.loads(capsys.readouterr().out)["shaft_speed_rpm"] == pytest.approx(1e4, rel=1e-12)
-
-
-def test_what_a_whole_bearing_does_not_take(capsys: pytest.CaptureFixture[str]):
-    assert main(["bifurcations", "nu2310"]) == 2
-    assert "Command bifurcations takes a cage, but nu2310" in capsys.readouterr().err
-    assert main(["simulate", "nu2310", "--speed", "10000", "--solver", "rk4"]) == 2
-    assert "--solver" in capsys.readouterr().err
-    assert main(["simulate", "nu2310", "--speed", "200000"]) == 2
-    assert "is 300 m/s at its land" in capsys.readouterr().err
-    assert main(["simulate", "1a", "--speed", "8500", "--load", "300 N"]) == 2
-    assert "Option --load goes with a bearing with its rollers" in capsys.readouterr().err

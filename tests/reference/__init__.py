@@ -19,18 +19,14 @@ code is used but what makes a model and lists its numbers. Shared by the tests a
 from ._field import Field as Field, field as field, numbers_of as numbers_of
 from ._integrate import (
     ESCAPE as ESCAPE,
-    Confirmed as Confirmed,
     Outside as Outside,
-    Revolutions as Revolutions,
-    Samples as Samples,
     TooLong as TooLong,
     confirmed as confirmed,
     growth as growth,
     revolutions as revolutions,
     sampled as sampled,
 )
-from ._land import film_in_polar as film_in_polar, ramp as ramp
-from ._pulses import Pulse as Pulse, pulse as pulse
+from ._pulses import pulse as pulse
 from ._random import (
     SPEEDS as SPEEDS,
     random_model as random_model,
@@ -38,5 +34,4 @@ from ._random import (
     random_state as random_state,
 )
 from ._shooting import bifurcation as bifurcation
-from ._statics import half_angle as half_angle, hunt_crossley_number as hunt_crossley_number, viscosity as viscosity
 from ._whole import WholeBearing as WholeBearing, gupta as gupta
