@@ -21,7 +21,7 @@ from jaxtyping import Array, Float, Int
 from .._errors import ArgumentError
 from .._pytrees import Form, compiled, split
 from ..models import AbstractForcedSystem, divide, multiply
-from .fields import SAMPLED, numbers_at, shape_of_numbers, traced_field
+from .fields import numbers_at, shape_of_numbers, traced_field
 from .ir import UnknownOperation, say_once
 from .layout import REVOLUTION, Tableau, layout_of
 from .loop import march_ir
@@ -137,10 +137,8 @@ class Engine:
         loaded[rows["step"][0]] = np.where(np.isnan(given), limits.first, given)
         loaded[rows["most"][0]] = limits.most * numbers.slow * more
         loaded[rows["peak"]] = 0.0 if field.excursion is not None else -np.inf
-        wide = loaded[rows["fixed"].start : rows["fixed"].stop]
-        if field.own_turn:
-            wide[0], wide[1] = REVOLUTION / self._samples if turn is None else turn, begin
-        wide[SAMPLED * field.own_turn :] = numbers.wide
+        loaded[rows["turn"][0]], loaded[rows["begin"][0]] = REVOLUTION / self._samples if turn is None else turn, begin
+        loaded[rows["fixed"].start : rows["fixed"].stop] = numbers.wide
         stored = np.zeros((rows["mark"].stop, lanes))
         strobe = np.full((lanes, keep, field.recorded), np.nan)
         growth = np.full((lanes, strobes, field.tangents), np.nan)

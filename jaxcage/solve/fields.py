@@ -23,15 +23,12 @@ from ..models import (
     ScaledField,
     multiply,
 )
-from .ir import Code, UnknownOperation, Value, is_variable, number
+from .ir import Code, Function, UnknownOperation, Value, is_variable, number
 from .kernel import rosenbrock_step
 from .layout import Field, Layout, fixed_numbers, rates_arguments
 from .program import Program, Sizes, depends, needed, program_of
 
 
-SAMPLED = 2
-"""Number of extra fixed numbers for several strobe states per revolution: the angle between two, and the first index.
-"""
 PASSED, NORMAL = len(Passed._fields), Passed._fields.index("normal")
 
 
@@ -116,14 +113,12 @@ def traced_field(
 ) -> Field:
     """Programs of a system, with one strobe state per revolution or, if `sampled`, several."""
     if system.beside:
-        return bearing_field(form, (True,) * SAMPLED + wide, system.dimension, tangents)
-    n, skip, moving = system.dimension, SAMPLED * sampled, system.dimension * (1 + tangents)
-    wide = (True,) * skip + wide
-    pieces = lambda fixed: form.filled(fixed[skip:])
+        return bearing_field(form, wide, system.dimension, tangents)
+    n, moving = system.dimension, system.dimension * (1 + tangents)
 
     def rates(phase: Any, moved: Any, fixed: Any) -> Any:
         """Rates of a state and of tangent vectors, in units of the scale."""
-        field, _, scale = pieces(fixed)
+        field, _, scale = form.filled(fixed)
         go = lambda y: _floats(ScaledField(field, scale)(phase, y))
         if not tangents:
             return go(moved)
@@ -133,7 +128,7 @@ def traced_field(
     def step(phase: Any, moved: Any, fixed: Any) -> Any:
         """Rosenbrock step in units of the scale: from its length, state and tangent vectors to state and tangent
         vectors at its end, and their estimated errors."""
-        (field, _, scale), (h, *y) = pieces(fixed), moved
+        (field, _, scale), (h, *y) = form.filled(fixed), moved
 
         def go(y: Any) -> Any:
             y1, error, _ = rosenbrock_step(ScaledField(field, scale), phase, lambda _: h, y)
@@ -144,11 +139,11 @@ def traced_field(
         return [c for half in (*halves[::2], *halves[1::2]) for c in half]
 
     def excursion(_: Any, moved: Any, fixed: Any) -> Any:
-        _, system, scale = pieces(fixed)
+        _, system, scale = form.filled(fixed)
         return (system.excursion(multiply(moved, scale)),)
 
     def abrupt(_: Any, moved: Any, fixed: Any) -> Any:
-        _, system, scale = pieces(fixed)
+        _, system, scale = form.filled(fixed)
         return system.abrupt(multiply(moved[:n], scale), multiply(moved[n:], scale))
 
     trace = lambda f, moved: _traced(f, moved, len(wide))
@@ -157,7 +152,7 @@ def traced_field(
     near = None if system.abrupt(ones, ones) is None else trace(abrupt, 2 * n)
     own_step = trace(step, 1 + moving) if implicit else None
     programs = prelude, late, trace(excursion, n), near
-    return Field(*programs, n, tangents, wide, own_step, own_turn=sampled, phased=sampled)
+    return Field(*programs, n, tangents, wide, own_step, phased=sampled)
 
 
 class RollersCode(NamedTuple):
@@ -169,7 +164,7 @@ class RollersCode(NamedTuple):
     angle: Program
     """Program for the cosine and sine of the cage's angle."""
 
-    def code(self, field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
+    def code(self, field: Field, rows: Layout, width: int) -> Function:
         """Code of `rates`, from state, tangents and additional integrands at `place` to their rates at `out`."""
         w = Code(width)
         z, size, tangents = self.rollers, field.dimension, field.tangents
@@ -178,18 +173,16 @@ class RollersCode(NamedTuple):
         phase = w.get(size * (1 + tangents), base="%place")
         cos, sin = w.program(self.angle, [number(0.0), phase])
         places = 2 * np.pi / z * np.arange(z)
-        table = ", ".join(f"double {number(x).text}" for pair in zip(np.cos(places), np.sin(places)) for x in pair)
+        table = ", ".join(f"double {number(x)}" for pair in zip(np.cos(places), np.sin(places)) for x in pair)
         # MOVING sums for the values and for each tangent, then the other sums, then the largest force and slip.
         moving, others = MOVING * (1 + tangents), PASSED - MOVING
-        whole = lambda k: Value(str(k), "i64", False)
 
         def roller(at: Any, sums: list[Value]) -> list[Value]:
             j = at(0)
-            cos_at = w.let(f"getelementptr double, ptr @places, i64 {w.simple('mul', j, whole(2)).text}", "ptr", False)
-            sin_at = w.let(f"getelementptr double, ptr {cos_at.text}, i64 1", "ptr", False)
-            place = [w.let(f"load double, ptr {x.text}", "double", False) for x in (cos_at, sin_at)]
-            first = w.simple("mul", j, whole(OF_ROLLER))
-            row = lambda k: w.simple("add", first, whole(k))
+            cos_at = w.element("@places", w.mul(j, number(2)))
+            place = [w.load(cos_at), w.load(w.element(cos_at, 1))]
+            first = w.mul(j, number(OF_ROLLER))
+            row = lambda k: w.add(first, number(k))
             numbers: list[Value] = []
             for t in range(1 + tangents):
                 numbers += [w.get(row(size * t + k), base="%place") for k in range(OF_ROLLER)] + own[t]
@@ -235,7 +228,7 @@ def bearing_field(form: Form, wide: tuple[bool, ...], dimension: int, tangents: 
         tangents of these, the rest of `Passed`, and the slip.
         """
         (cos_j, sin_j, cos, sin), numbers = moved[:4], moved[4:]
-        at, _, units = form.filled(fixed[SAMPLED:])
+        at, _, units = form.filled(fixed)
         pocket = cos * cos_j - sin * sin_j, sin * cos_j + cos * sin_j
 
         def go(y: Any) -> tuple[Any, Any]:
@@ -255,7 +248,7 @@ def bearing_field(form: Form, wide: tuple[bool, ...], dimension: int, tangents: 
         move them, the tangents of both, the other sums, and the largest pocket force and slip.
         """
         (cos, sin), numbers, (normal, slip) = moved[:2], moved[2:-2], moved[-2:]
-        at, _, scale = form.filled(fixed[SAMPLED:])
+        at, _, scale = form.filled(fixed)
         units, size = scale[OF_ROLLER:], OF_BODIES + MOVING
         rest = numbers[size * (1 + tangents) :]
 
@@ -271,7 +264,7 @@ def bearing_field(form: Form, wide: tuple[bool, ...], dimension: int, tangents: 
 
         return _with_tangents(go, numbers, size, tangents)
 
-    at, *_ = form.filled([1.0] * (len(wide) - SAMPLED))
+    at, *_ = form.filled([1.0] * len(wide))
     trace = lambda f, moved: _traced(f, moved, len(wide))
     code = RollersCode(
         at.n_rollers,
@@ -279,5 +272,5 @@ def bearing_field(form: Form, wide: tuple[bool, ...], dimension: int, tangents: 
         trace(bodies, 2 + (OF_BODIES + MOVING) * (1 + tangents) + PASSED - MOVING + 2),
         _traced(lambda _, moved, fixed: cos_sin(moved[0]), 1, 0),
     )
-    more = {"beside": len(BESIDE), "watched": len(WATCHED), "own_turn": True, "relative": False, "careful": False}
+    more = {"beside": len(BESIDE), "watched": len(WATCHED), "relative": False}
     return Field(None, code, None, None, dimension, tangents, wide, **more)

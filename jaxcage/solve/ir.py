@@ -6,6 +6,7 @@ the contact force, while no cage of the vector touches its land.
 """
 
 import functools
+import graphlib
 import heapq
 import struct
 import warnings
@@ -85,28 +86,26 @@ def in_groups(equations: Sequence[Any], path: dict[Any, Path]) -> list[tuple[Pat
     """Equations in as few groups of one path each as possible; those that are always needed come first."""
     made = {v: i for i, e in enumerate(equations) for v in e.outvars}
     paths = [path[e.outvars[0]] for e in equations]
-    waits, readers = [0] * len(equations), [[] for _ in equations]
+    reads = [(*e.invars, *(m for m, _ in p)) for e, p in zip(equations, paths, strict=True)]
+    before = ({made[v] for v in row if is_variable(v) and v in made} for row in reads)
+    order = graphlib.TopologicalSorter(dict(enumerate(before)))
+    order.prepare()
     ready: dict[Path, list[int]] = {p: [] for p in sorted(dict.fromkeys(paths), key=len)}
-    for i, e in enumerate(equations):
-        before = {made[v] for v in (*e.invars, *(m for m, _ in paths[i])) if is_variable(v) and v in made}
-        waits[i] = len(before)
-        for j in before:
-            readers[j].append(i)
-        if not before:
-            ready[paths[i]].append(i)
+
+    def collect() -> None:
+        for i in order.get_ready():
+            heapq.heappush(ready[paths[i]], i)
+
+    collect()
     groups: list[tuple[Path, list[Any]]] = []
     while any(ready.values()):
         p = next(p for p, rows in ready.items() if rows)
-        heapq.heapify(ready[p])
-        taken: list[int] = []
+        groups.append((p, []))
         while ready[p]:
             i = heapq.heappop(ready[p])
-            taken.append(i)
-            for j in readers[i]:
-                waits[j] -= 1
-                if waits[j] == 0:
-                    heapq.heappush(ready[paths[j]], j)
-        groups.append((p, [equations[i] for i in taken]))
+            groups[-1][1].append(equations[i])
+            order.done(i)
+            collect()
     return groups
 
 
@@ -115,21 +114,34 @@ class Value(NamedTuple):
 
     text: str
     kind: str
-    wide: bool
+    wide: bool = False
 
     @property
     def known(self) -> bool:
         """True for a literal."""
         return not self.text.startswith("%")
 
+    def __str__(self) -> str:
+        return self.text
+
 
 def number(x: Any) -> Value:
     x = np.asarray(x)
     if x.dtype == bool:
-        return Value("true" if x else "false", "i1", False)
+        return Value("true" if x else "false", "i1")
     if x.dtype.kind in "iu":
-        return Value(str(int(x)), "i64", False)
-    return Value(f"0x{struct.unpack('<Q', struct.pack('<d', float(x)))[0]:016X}", "double", False)
+        return Value(str(int(x)), "i64")
+    return Value(f"0x{struct.unpack('<Q', struct.pack('<d', float(x)))[0]:016X}", "double")
+
+
+Function = tuple[str, set[str]]
+"""Code of a function, and the declarations that it needs."""
+
+
+def module(*functions: Function) -> str:
+    """Code of a module of functions."""
+    declarations = sorted(set().union(*(declared for _, declared in functions)))
+    return "\n".join([*(text for text, _ in functions), *declarations, '!0 = !{!"branch_weights", i32 1, i32 30}', ""])
 
 
 class Code:
@@ -146,14 +158,14 @@ class Code:
         return f"<{self.width} x {kind}>" if wide else kind
 
     def typed(self, v: Value) -> str:
-        return f"{self.type(v.kind, v.wide)} {v.text}"
+        return f"{self.type(v.kind, v.wide)} {v}"
 
     def line(self, text: str) -> None:
         self.lines.append(text if text.endswith(":") else f"  {text}")
         if text.endswith(":"):
             self.block = text[:-1]
 
-    def let(self, text: str, kind: str, wide: bool) -> Value:
+    def let(self, text: str, kind: str, wide: bool = False) -> Value:
         self.names += 1
         self.line(f"%v{self.names} = {text}")
         return Value(f"%v{self.names}", kind, wide)
@@ -163,8 +175,8 @@ class Code:
         if v.wide:
             return v
         if v.known:
-            return Value(f"splat ({v.kind} {v.text})", v.kind, True)
-        one = self.let(f"insertelement {self.type(v.kind, True)} poison, {v.kind} {v.text}, i64 0", v.kind, True)
+            return Value(f"splat ({v.kind} {v})", v.kind, True)
+        one = self.let(f"insertelement {self.type(v.kind, True)} poison, {v.kind} {v}, i64 0", v.kind, True)
         zeros = f"<{self.width} x i32> zeroinitializer"
         return self.let(f"shufflevector {self.typed(one)}, {self.typed(one)}, {zeros}", v.kind, True)
 
@@ -175,7 +187,7 @@ class Code:
     def simple(self, op: str, *operands: Value, kind: str | None = None) -> Value:
         """Write an instruction whose operands are all of one type."""
         x = self.alike(operands)
-        rest = "".join(f", {v.text}" for v in x[1:])
+        rest = "".join(f", {v}" for v in x[1:])
         return self.let(f"{op} {self.typed(x[0])}{rest}", kind or x[0].kind, x[0].wide)
 
     def call(self, name: str, *operands: Value) -> Value:
@@ -250,8 +262,11 @@ class Code:
         """True if a mask holds for any lane."""
         if not mask.wide:
             return mask
-        bits = self.let(f"bitcast {self.typed(mask)} to i{self.width}", f"i{self.width}", False)
-        return self.let(f"icmp ne i{self.width} {bits.text}, 0", "i1", False)
+        return self.compare("ne", self.bits(mask), number(0))
+
+    def bits(self, mask: Value) -> Value:
+        """The bits of a mask as one integer."""
+        return self.let(f"bitcast {self.typed(mask)} to i{self.width}", f"i{self.width}")
 
     def convert(self, op: str, x: Value, kind: str) -> Value:
         return self.let(f"{op} {self.typed(x)} to {self.type(kind, x.wide)}", kind, x.wide)
@@ -325,47 +340,94 @@ class Code:
         known |= {v: number(c) for v, c in zip(jaxpr.constvars, program.consts, strict=True)}
         read = lambda atom: known[atom] if is_variable(atom) else number(atom.val)
         for path, equations in in_groups(jaxpr.eqns, branches(jaxpr.eqns, jaxpr.outvars)):
-            before = block = after = self.block
-            if path:
-                some = self.any(self.both(*(known[m] if side else self.negated(known[m]) for m, side in path)))
-                self.names += 1
-                block, after = f"some{self.names}", f"after{self.names}"
-                self.line(f"br i1 {some.text}, label %{block}, label %{after}, !prof !0")
-                self.line(f"{block}:")
-            for e in equations:
-                known[e.outvars[0]] = self.equation(e, [read(v) for v in e.invars])
-            if path:
-                self.line(f"br label %{after}")
-                self.line(f"{after}:")
+
+            def write(equations: Sequence[Any] = equations) -> list[Value]:
                 for e in equations:
-                    v = known[e.outvars[0]]
-                    merged = f"phi {self.type(v.kind, v.wide)} [ {v.text}, %{block} ], [ poison, %{before} ]"
-                    known[e.outvars[0]] = self.let(merged, v.kind, v.wide)
+                    known[e.outvars[0]] = self.equation(e, [read(v) for v in e.invars])
+                return [known[e.outvars[0]] for e in equations]
+
+            if not path:
+                write()
+                continue
+            some = self.any(self.both(*(known[m] if side else self.negated(known[m]) for m, side in path)))
+            known.update(zip((e.outvars[0] for e in equations), self.when(some, write, "!prof !0"), strict=True))
         return [read(v) for v in jaxpr.outvars]
 
-    def taken(self) -> str:
-        """Text of the lines written since the last call."""
-        lines, self.lines = self.lines, []
-        return "\n".join(lines)
+    def when(self, some: Value, body: Callable[[], Any], *about: str, otherwise: Any = None) -> list[Value]:
+        """Write `body()`, which runs if `some` is true; return its results, or those of `otherwise` (by default
+        undefined). The branch may have data `about` it."""
+        self.names += 1
+        before, block, after = self.block, f"some{self.names}", f"after{self.names}"
+        self.line(", ".join([f"br i1 {some}, label %{block}, label %{after}", *about]))
+        self.line(f"{block}:")
+        results = body() or ()
+        block = self.block
+        self.line(f"br label %{after}")
+        self.line(f"{after}:")
+        others = otherwise or [Value("poison", v.kind) for v in results]
+        merged = lambda v, other: f"phi {self.type(v.kind, v.wide)} [ {v}, %{block} ], [ {other}, %{before} ]"
+        return [self.let(merged(v, other), v.kind, v.wide) for v, other in zip(results, others, strict=True)]
 
-    def function(self, name: str, arguments: str) -> tuple[str, set[str]]:
-        """Text of the lines written as a function, and its declarations."""
-        head = f"define internal void @{name}({arguments}) noinline {{\nentry:\n"
-        return f"{head}{self.taken()}\n  ret void\n}}\n", self.declarations
+    def loop(
+        self, end: Value, begin: Sequence[Value], body: Callable[[Value, list[Value]], Any], step: int = 1
+    ) -> list[Value]:
+        """Apply `body(number, values)` to `begin` and then to its results, for numbers from 0 to `end` by `step`."""
+        self.names += 1
+        name, before = f"%n{self.names}", self.block
+        head, inside, after = (f"{part}{self.names}" for part in ("loop", "inside", "done"))
+        values = [v._replace(text=f"{name}_{k}") for k, v in enumerate(begin)]
+        outer, self.lines = self.lines, []
+        self.line(f"{inside}:")
+        new = body(Value(name, "i64"), values) or ()
+        latch, lines, self.lines = self.block, self.lines, outer
+        self.line(f"br label %{head}")
+        self.line(f"{head}:")
+        self.line(f"{name} = phi i64 [ 0, %{before} ], [ {name}_next, %{latch} ]")
+        for v, first, later in zip(values, begin, new, strict=True):
+            self.line(f"{v} = phi {self.type(v.kind, v.wide)} [ {first}, %{before} ], [ {later}, %{latch} ]")
+        self.line(f"{name}_more = icmp slt i64 {name}, {end}")
+        self.line(f"br i1 {name}_more, label %{inside}, label %{after}")
+        self.lines += lines
+        self.line(f"{name}_next = add i64 {name}, {step}")
+        self.line(f"br label %{head}")
+        self.line(f"{after}:")
+        return values
+
+    def function(self, name: str, arguments: str, result: Value | None = None, linkage: str = "internal ") -> Function:
+        """The lines written as a function, and its declarations."""
+        kind, value = (result.kind, f" {result}") if result else ("void", "")
+        lines = "\n".join(self.lines)
+        text = f"define {linkage}{kind} @{name}({arguments}) noinline {{\nentry:\n{lines}\n  ret {kind}{value}\n}}\n"
+        return text, self.declarations
+
+    def element(self, base: str | Value, index: int | Value, kind: str = "double") -> Value:
+        """Address of an element of an array of scalars."""
+        return self.let(f"getelementptr {kind}, ptr {base}, i64 {index}", "ptr")
+
+    def load(self, address: Value, kind: str = "double", wide: bool = False, how: str = "") -> Value:
+        """Load what is at an address; `how` is the alignment of a vector if it is not that of its type."""
+        return self.let(f"load {self.type(kind, wide)}, ptr {address}{how}", kind, wide)
+
+    def store(self, v: Value, address: Value, how: str = "") -> None:
+        self.line(f"store {self.typed(v)}, ptr {address}{how}")
+
+    def load_atomically(self, address: Value) -> Value:
+        """Load an integer that threads share."""
+        return self.let(f"load atomic volatile i64, ptr {address} monotonic, align 8", "i64")
+
+    def add_atomically(self, address: Value, x: Value) -> Value:
+        """Add to an integer that threads share; return what it was."""
+        return self.let(f"atomicrmw add ptr {address}, {self.typed(x)} monotonic", x.kind)
 
     def at(self, row: int | Value, base: str = "%memory") -> Value:
-        if isinstance(row, Value):
-            offset = self.simple("mul", row, Value(str(self.width * 8), "i64", False)).text
-        else:
-            offset = str(row * self.width * 8)
-        return self.let(f"getelementptr i8, ptr {base}, i64 {offset}", "ptr", False)
+        size = self.width * 8
+        return self.element(base, self.mul(row, number(size)) if isinstance(row, Value) else row * size, "i8")
 
     def get(self, row: int | Value, wide: bool = True, base: str = "%memory") -> Value:
-        return self.let(f"load {self.type('double', wide)}, ptr {self.at(row, base).text}", "double", wide)
+        return self.load(self.at(row, base), wide=wide)
 
     def put(self, row: int | Value, v: Value, wide: bool = True, base: str = "%memory") -> None:
-        v = self.widened(v) if wide else v
-        self.line(f"store {self.typed(v)}, ptr {self.at(row, base).text}")
+        self.store(self.widened(v) if wide else v, self.at(row, base))
 
     def all(self, rows: Sequence[int]) -> list[Value]:
         return [self.get(r) for r in rows]
@@ -379,38 +441,13 @@ class Code:
     ) -> list[Value]:
         """Apply `body(row, values)` to `begin` and then to its results, for `count` rows, unrolled if they are few;
         `row(k)` is the k-th row plus the number of the present pass."""
-        rest = lambda new: [] if new is None else list[Value](new)
         values = [self.widened(v) for v in begin]
-        if count <= written_out:
-            for q in range(count):
-                values = rest(body(lambda k, q=q: k + q, values))
-            return values
-        self.names += 1
-        before, loop, done = self.block, f"loop{self.names}", f"done{self.names}"
-        place = Value(f"%row{self.names}", "i64", False)
-        inside = [Value(f"{place.text}_{k}", "double", True) for k in range(len(values))]
-        outer, self.lines = self.lines, []
-        self.block = loop
-        new = rest(body(lambda k: self.simple("add", place, Value(str(k), "i64", False)) if k else place, inside))
-        latch = self.block
-        lines, self.lines = self.lines, outer
-        vector = self.type("double", True)
-        self.line(f"br label %{loop}")
-        self.line(f"{loop}:")
-        self.line(f"{place.text} = phi i64 [ 0, %{before} ], [ {place.text}_next, %{latch} ]")
-        for old, start, after in zip(inside, values, new, strict=True):
-            self.line(f"{old.text} = phi {vector} [ {start.text}, %{before} ], [ {after.text}, %{latch} ]")
-        self.lines += lines
-        self.line(f"{place.text}_next = add i64 {place.text}, 1")
-        self.line(f"{place.text}_more = icmp slt i64 {place.text}_next, {count}")
-        self.line(f"br i1 {place.text}_more, label %{loop}, label %{done}")
-        self.line(f"{done}:")
-        return new
-
-    def shared(self, k: int) -> Value:
-        """Load a fixed number that is common to all lanes."""
-        at = self.let(f"getelementptr double, ptr %shared, i64 {k}", "ptr", False)
-        return self.let(f"load double, ptr {at.text}", "double", False)
+        if count > written_out:
+            row = lambda place: lambda k: self.add(place, number(k)) if k else place
+            return self.loop(number(count), values, lambda place, values: body(row(place), values))
+        for q in range(count):
+            values = body(lambda k, q=q: k + q, values) or []
+        return values
 
     def log2(self, x: Value) -> Value:
         """Binary logarithm of a positive number, within 0.09."""

@@ -78,13 +78,10 @@ class Field(NamedTuple):
     watched: int = 1
     """Number of quantities whose maximum is recorded; if more than the excursion, between strobe states."""
     phased: bool = False
-    """True if a lane's phase at a strobe state follows from its index and the second fixed number."""
-    own_turn: bool = False
-    """True if the first fixed number is the phase from strobe to strobe, instead of a revolution."""
+    """True if the phase of the law at a strobe state follows from its index."""
     relative: bool = True
-    """True if errors are relative to the state plus one, False if in units of the scale."""
-    careful: bool = True
-    """True if the errors of tangent vectors also control the steps."""
+    """True if errors are relative to the state plus one, and those of tangent vectors also control the steps; False if
+    they are in units of the scale, and of the state alone."""
 
     @property
     def moving(self) -> int:
@@ -110,7 +107,7 @@ def layout_of(field: Field, stages: int) -> Layout:
         "peak": field.watched,
         "steps": 1,
         "mark": 1,
-        "most": 1,
+        **dict.fromkeys(("most", "turn", "begin"), 1),
         "fixed": sum(field.wide),
         **dict.fromkeys(("phase", "error", "revolution", "first_step", "lane"), 1),
         "rate": field.span * stages,
@@ -128,7 +125,7 @@ def fixed_numbers(w: Code, field: Field, rows: Layout, program: Any, first: int)
     values, wide_row, shared = [], iter(rows["fixed"]), itertools.count()
     for k, wide in zip(range(first, len(program.jaxpr.invars)), field.wide, strict=False):
         at = next(wide_row if wide else shared)
-        values.append((w.get(at) if wide else w.shared(at)) if k in used else number(0.0))
+        values.append((w.get(at) if wide else w.load(w.element("%shared", at))) if k in used else number(0.0))
     return values
 
 

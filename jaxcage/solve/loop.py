@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..models import ESCAPE
-from .ir import Code, Value, is_variable, number
+from .ir import Code, Function, Value, is_variable, module, number
 from .layout import REVOLUTION, Field, Layout, Tableau, fixed_numbers, layout_of, rates_arguments
 from .outcomes import FINISHED, NOT_FINITE, OUTSIDE, STUCK, TOO_MANY
 from .program import following
@@ -32,11 +32,7 @@ def march_ir(field: Field, pair: str, width: int) -> str:
     made = [_prelude(field, rows, width)] if field.prelude else []
     rates = field.rates.code(field, rows, width) if hasattr(field.rates, "code") else _rates(field, rows, width)
     implicit = [_implicit(field, rows, width)] if tableau.implicit else []
-    first = {"mark": rows["mark"][0] * width, "lane": rows["lane"][0] * width}
-    refill = REFILL.format(width=width, n_stored=rows["mark"].stop, n_loaded=rows["first_step"].stop, **first)
-    parts = [*made, rates, *implicit, (refill, set()), _loop(field, rows, tableau, width)]
-    declarations = sorted(set().union(*(declared for _, declared in parts)))
-    return "\n".join([*(text for text, _ in parts), *declarations, '!0 = !{!"branch_weights", i32 1, i32 30}', ""])
+    return module(*made, rates, *implicit, _refill(rows, width), _loop(field, rows, tableau, width))
 
 
 def _made_wide(field: Field) -> list[bool]:
@@ -46,7 +42,7 @@ def _made_wide(field: Field) -> list[bool]:
     return [is_variable(v) and v in wide for v in jaxpr.outvars]
 
 
-def _prelude(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
+def _prelude(field: Field, rows: Layout, width: int) -> Function:
     """Code for everything that depends on the fixed numbers alone."""
     w = Code(width)
     results = w.program(field.prelude, fixed_numbers(w, field, rows, field.prelude, 0))
@@ -55,7 +51,7 @@ def _prelude(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
     return w.function("prelude", "ptr noalias %memory, ptr noalias %shared")
 
 
-def _rates(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
+def _rates(field: Field, rows: Layout, width: int) -> Function:
     """Code for the rates of state and tangents at `place`, stored at `out`."""
     w = Code(width)
     moved = [w.get(j, base="%place") for j in range(field.moving)]
@@ -68,7 +64,7 @@ def _rates(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
     return w.function("rates", rates_arguments(w))
 
 
-def _implicit(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
+def _implicit(field: Field, rows: Layout, width: int) -> Function:
     """Code for an implicit step from the state in memory, with the new state in `stage` and its errors in `again`."""
     w = Code(width)
     assert field.step is not None
@@ -83,92 +79,43 @@ def _implicit(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
     return w.function("implicit", f"{vector} %phase, {vector} %step, ptr noalias %memory, ptr noalias %shared")
 
 
-REFILL = """define internal i1 @refill(ptr %memory, ptr %queue, i64 %lanes, ptr %loaded, ptr %stored) noinline {{
-entry:
-  %stop_at = getelementptr i64, ptr %queue, i64 1
-  %marks = getelementptr double, ptr %memory, i64 {mark}
-  %places = getelementptr double, ptr %memory, i64 {lane}
-  br label %element
-element:
-  %j = phi i64 [ 0, %entry ], [ %j_next, %next ]
-  %alive = phi i1 [ false, %entry ], [ %alive_next, %next ]
-  %column = getelementptr double, ptr %memory, i64 %j
-  %mark_at = getelementptr double, ptr %marks, i64 %j
-  %place_at = getelementptr double, ptr %places, i64 %j
-  %mark = load double, ptr %mark_at
-  %through = fcmp une double %mark, 0.0
-  br i1 %through, label %leave, label %next
-leave:
-  %old = load double, ptr %place_at
-  %lane = fptosi double %old to i64
-  %was = icmp sge i64 %lane, 0
-  br i1 %was, label %store, label %fetch
-store:
-  %r = phi i64 [ 0, %leave ], [ %r_next, %store ]
-  %from_row = mul i64 %r, {width}
-  %from = getelementptr double, ptr %column, i64 %from_row
-  %value = load double, ptr %from
-  %to_row = mul i64 %r, %lanes
-  %to_place = add i64 %to_row, %lane
-  %to = getelementptr double, ptr %stored, i64 %to_place
-  store double %value, ptr %to
-  %r_next = add i64 %r, 1
-  %more = icmp slt i64 %r_next, {n_stored}
-  br i1 %more, label %store, label %fetch
-fetch:
-  %stopped = load atomic volatile i64, ptr %stop_at monotonic, align 8
-  %goes_on = icmp eq i64 %stopped, 0
-  br i1 %goes_on, label %ask, label %empty
-ask:
-  %new = atomicrmw add ptr %queue, i64 1 monotonic
-  %some = icmp slt i64 %new, %lanes
-  br i1 %some, label %load, label %empty
-load:
-  %s = phi i64 [ 0, %ask ], [ %s_next, %load ]
-  %in_row = mul i64 %s, %lanes
-  %in_place = add i64 %in_row, %new
-  %in = getelementptr double, ptr %loaded, i64 %in_place
-  %given = load double, ptr %in
-  %out_row = mul i64 %s, {width}
-  %out = getelementptr double, ptr %column, i64 %out_row
-  store double %given, ptr %out
-  %s_next = add i64 %s, 1
-  %rest = icmp slt i64 %s_next, {n_loaded}
-  br i1 %rest, label %load, label %begin
-begin:
-  %number = sitofp i64 %new to double
-  store double %number, ptr %place_at
-  br label %next
-empty:
-  store double -1.0, ptr %place_at
-  br label %next
-next:
-  %now = load double, ptr %place_at
-  %runs = fcmp oge double %now, 0.0
-  %alive_next = or i1 %alive, %runs
-  %j_next = add i64 %j, 1
-  %again = icmp slt i64 %j_next, {width}
-  br i1 %again, label %element, label %return
-return:
-  ret i1 %alive_next
-}}
-"""
-"""Function that stores lanes that have ended and loads lanes of the queue; true if any lane is left."""
+def _refill(rows: Layout, width: int) -> Function:
+    """Code of `refill`, which stores lanes that have ended and loads lanes of the queue; true if any lane is left."""
+    w = Code(width)
+    lanes = Value("%lanes", "i64")
+    of_lane = lambda base, row, lane: w.element(base, w.add(w.mul(row, lanes), lane))
+
+    def renew(j: Value, alive: list[Value]) -> list[Value]:
+        """Renew one lane of the vector."""
+        mine = lambda row: w.element("%memory", w.add(w.mul(row, number(width)), j))
+        place = mine(number(rows["lane"][0]))
+
+        def leave() -> None:
+            lane = w.convert("fptosi", w.load(place), "i64")
+            keep = lambda row, _: w.store(w.load(mine(row)), of_lane("%stored", row, lane))
+            w.when(w.compare("ge", lane, number(0)), lambda: w.loop(number(rows["mark"].stop), [], keep))
+            w.store(*w.when(_goes_on(w), enter, otherwise=[number(-1.0)]), place)
+
+        def enter() -> list[Value]:
+            lane = w.add_atomically(w.element("%queue", 0, "i64"), number(1))
+            some = w.compare("lt", lane, lanes)
+            fetch = lambda row, _: w.store(w.load(of_lane("%loaded", row, lane)), mine(row))
+            w.when(some, lambda: w.loop(number(rows["first_step"].stop), [], fetch))
+            return [w.select(some, w.convert("sitofp", lane, "double"), number(-1.0))]
+
+        w.when(w.compare("ne", w.load(mine(number(rows["mark"][0]))), number(0.0)), leave)
+        return [w.simple("or", *alive, w.compare("ge", w.load(place), number(0.0)))]
+
+    (alive,) = w.loop(number(width), [number(False)], renew)
+    return w.function("refill", "ptr %memory, ptr %queue, i64 %lanes, ptr %loaded, ptr %stored", alive)
 
 
-STROBES_COUNTED = """%bits = bitcast {over} to i{width}
-  %bits_wide = zext i{width} %bits to i64
-  %reached = call i64 @llvm.ctpop.i64(i64 %bits_wide)
-  %counted_at = getelementptr i64, ptr %queue, i64 2
-  %counted = atomicrmw add ptr %counted_at, i64 %reached monotonic
-  %flag_at = getelementptr i64, ptr %queue, i64 1
-  %flag = load atomic volatile i64, ptr %flag_at monotonic, align 8
-  %stops = icmp ne i64 %flag, 0
-  br i1 %stops, label %return, label %record"""
-"""Code that counts the strobe states that were reached, and returns if the stop flag is set."""
+def _goes_on(w: Code) -> Value:
+    """True if the stop flag is not set."""
+    return w.compare("eq", w.load_atomically(w.element("%queue", 1, "i64")), number(0))
 
 
-def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str, set[str]]:
+def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> Function:
     """Code for the steps of a vector of lanes, with their control."""
     w = Code(width)
     n, moving, stages, span = field.dimension, field.moving, len(tableau.phase), field.span
@@ -181,25 +128,27 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
         """Phase of the law; that of the loop restarts at each strobe state."""
         if not field.phased:
             return phase
-        turn, k = w.get(row["fixed"]), w.add(w.get(row["fixed"] + 1), w.get(row["revolution"]))
+        turn, k = w.get(row["turn"]), w.add(w.get(row["begin"]), w.get(row["revolution"]))
         half = w.mul(w.add(k, number(0.5)), w.mul(turn, number(1 / REVOLUTION)))
         begun = w.sub(w.mul(turn, k), w.mul(w.call("floor", half), number(REVOLUTION)))
         return w.add(begun, phase)
 
     def rates(phase: Value, place: int, out: int) -> None:
         phase = w.widened(since_zero(phase))
-        at = w.at(place).text, w.at(out).text
-        w.line(f"call void @rates({w.typed(phase)}, ptr {at[0]}, ptr %memory, ptr %shared, ptr {at[1]})")
+        w.line(f"call void @rates({w.typed(phase)}, ptr {w.at(place)}, ptr %memory, ptr %shared, ptr {w.at(out)})")
+
+    def renew_rates(some: Value) -> None:
+        """Rates at the present state, in the lanes where the mask holds."""
+        rates(w.get(row["phase"]), row["state"], row["again"])
+        new = lambda at: w.select(some, w.get(at(row["again"])), w.get(at(at_stage(0))))
+        w.over(moving, (), lambda at, _: w.put(at(at_stage(0)), new(at)))
 
     w.line(f"%memory = alloca {vector}, i64 {total_rows}, align {max(64, width * 8)}")
     size = total_rows * width * 8
     w.line(f"call void @llvm.memset.p0.i64(ptr align 8 %memory, i8 0, i64 {size}, i1 false)")
     w.declarations.add("declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)")
-    for k, name in enumerate(("tolerance", "largest", "smallest")):
-        w.line(f"%{name}_at = getelementptr double, ptr %settings, i64 {k}")
-        w.line(f"%{name} = load double, ptr %{name}_at")
-    tolerance, largest, smallest = (Value(f"%{x}", "double", False) for x in ("tolerance", "largest", "smallest"))
-    total, kept = (w.convert("sitofp", Value(f"%{x}", "i64", False), "double") for x in ("revolutions", "keep"))
+    tolerance, largest, smallest = (w.load(w.element("%settings", k)) for k in range(3))
+    total, kept = (w.convert("sitofp", Value(f"%{x}", "i64"), "double") for x in ("revolutions", "keep"))
     w.put(row["mark"], one)
     w.put(row["lane"], number(-1.0))
     w.line("br label %refill")
@@ -210,23 +159,16 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     w.line("begin:")
     if field.prelude:
         w.line("call void @prelude(ptr %memory, ptr %shared)")
-    rates(w.get(row["phase"]), row["state"], row["again"])
-    begun = w.compare("ne", w.get(row["first_step"]), zero)
-
-    def keep_rate(at: Any, _: Any) -> None:
-        w.put(at(at_stage(0)), w.select(begun, w.get(at(at_stage(0))), w.get(at(row["again"]))))
-
-    w.over(moving, (), keep_rate)
+    renew_rates(w.compare("eq", w.get(row["first_step"]), zero))
     w.put(row["first_step"], one)
     w.line("br label %step")
 
     w.line("step:")
     phase, h, lane, mark = (w.get(row[x]) for x in ("phase", "step", "lane", "mark"))
-    turn = w.get(row["fixed"]) if field.own_turn else number(REVOLUTION)
     runs = w.both(w.compare("ge", lane, zero), w.compare("eq", mark, zero))
     arguments = lambda program, leading: [*leading, *fixed_numbers(w, field, rows, program, len(leading))]
     limited = h if field.abrupt is None else limited_step(w, field, rows, lambda: since_zero(phase), h)
-    step, ends, halves = step_to_strobe(w, limited, w.sub(turn, phase))
+    step, ends, halves = step_to_strobe(w, limited, w.sub(w.get(row["turn"]), phase))
     if tableau.implicit:
         at = w.typed(w.widened(since_zero(phase))), w.typed(w.widened(step))
         w.line(f"call void @implicit({at[0]}, {at[1]}, ptr %memory, ptr %shared)")
@@ -274,12 +216,13 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     most = w.mul(w.get(row["most"]), w.add(w.get(row["revolution"]), one))
     mark = w.select(w.both(runs, w.compare("gt", taken, most)), marked(TOO_MANY), mark)
     w.put(row["mark"], mark)
-    w.line(f"br i1 {w.any(over).text}, label %over, label %check")
+    w.line(f"br i1 {w.any(over)}, label %over, label %check")
 
     w.line("over:")
-    w.line(STROBES_COUNTED.format(over=w.typed(over), width=width))
+    reached = w.call("ctpop", w.convert("zext", w.bits(over), "i64"))
+    w.add_atomically(w.element("%queue", 2, "i64"), reached)
+    w.line(f"br i1 {_goes_on(w)}, label %record, label %return")
     w.line("record:")
-    w.declarations.add("declare i64 @llvm.ctpop.i64(i64)")
     revolution = w.get(row["revolution"])
     ring = w.sub(revolution, w.mul(kept, w.call("floor", w.div(w.add(revolution, number(0.5)), kept))))
     recorded = number(float(field.recorded))
@@ -290,8 +233,8 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
 
         def record(at: Any, _: Any, first: int = first, done: int = done) -> None:
             behind = at(done)
-            behind = behind if isinstance(behind, Value) else Value(str(behind), "i64", False)
-            w.store_if(over, w.get(at(first)), "%strobe", w.simple("add", place, behind))
+            at_place = w.add(place, behind if isinstance(behind, Value) else number(behind))
+            w.store_if(over, w.get(at(first)), "%strobe", at_place)
 
         w.over(count, (), record)
         done += count
@@ -303,24 +246,20 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     w.put(row["revolution"], revolution)
     if field.tangents:
         _orthonormalise(w, field, rows, over, place)
-        rates(w.get(row["phase"]), row["state"], row["again"])
-
-        def renew(at: Any, _: Any) -> None:
-            w.put(at(at_stage(0)), w.select(over, w.get(at(row["again"])), w.get(at(at_stage(0)))))
-
-        w.over(moving, (), renew)
+        renew_rates(over)
     finished = w.both(over, w.compare("ge", revolution, total), w.compare("eq", mark, zero))
     w.put(row["mark"], w.select(finished, marked(FINISHED), mark))
     w.line("br label %check")
 
     w.line("check:")
     leaves = w.both(w.compare("ge", w.get(row["lane"]), zero), w.compare("ne", w.get(row["mark"]), zero))
-    w.line(f"br i1 {w.any(leaves).text}, label %refill, label %step")
-    head = (
-        "define void @march(ptr %queue, i64 %lanes, i64 %revolutions, i64 %keep, ptr %settings, ptr %shared, "
-        "ptr %loaded, ptr %stored, ptr %strobe, ptr %growth) {\nentry:\n"
+    w.line(f"br i1 {w.any(leaves)}, label %refill, label %step")
+    w.line("return:")
+    arguments = (
+        "ptr %queue, i64 %lanes, i64 %revolutions, i64 %keep, ptr %settings, ptr %shared, "
+        "ptr %loaded, ptr %stored, ptr %strobe, ptr %growth"
     )
-    return head + w.taken() + "\nreturn:\n  ret void\n}\n", w.declarations
+    return w.function("march", arguments, linkage="")
 
 
 def _orthonormalise(w: Code, field: Field, rows: Layout, over: Value, revolution: Value) -> None:
@@ -344,7 +283,7 @@ def _orthonormalise(w: Code, field: Field, rows: Layout, over: Value, revolution
 
             w.over(n, (), project)
         length2 = dot(mine, mine)
-        w.store_if(over, length2, "%growth", w.simple("add", place, Value(str(i), "i64", False)))
+        w.store_if(over, length2, "%growth", w.add(place, number(i)))
         inverse = w.select(over, w.div(number(1.0), w.call("sqrt", length2)), number(1.0))
 
         def normalise(at: Any, _: Any, mine: int = mine, inverse: Value = inverse) -> None:

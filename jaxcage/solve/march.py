@@ -24,8 +24,8 @@ from jax.interpreters import ad, batching, mlir, partial_eval
 from jaxtyping import Array, Int
 
 from .._errors import InputError
-from .ir import Code, UnknownOperation, Value, number, say_once
-from .object_code import UnknownInterface, handler_ir, registered
+from .ir import Code, Function, UnknownOperation, Value, module, number, say_once
+from .object_code import UnknownInterface, handler, registered, word
 from .program import CONTROL_FLOW, Numbers, Sizes, Step, program_of
 
 
@@ -244,8 +244,7 @@ def code_of(step: Any, sizes: Sizes, wide: tuple[bool, ...], width: int) -> tupl
     program = program_of(step, sizes)
     read = tuple(i - 1 - moving for i in program.needed if i > moving)
     try:
-        ir = loop_ir(program, moving, [(k, wide[k]) for k in read], width)
-        ir = f"{ir}\n{handler_ir(1 + moving + len(read), moving)}"
+        ir = module(loop_ir(program, moving, [(k, wide[k]) for k in read], width), handler())
     except (UnknownOperation, UnknownInterface) as unknown:
         say_once(str(unknown))
         return None
@@ -254,78 +253,37 @@ def code_of(step: Any, sizes: Sizes, wide: tuple[bool, ...], width: int) -> tupl
     return name, read
 
 
-def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: int) -> str:
+def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: int) -> Function:
     """Code of `march(inputs, outputs)`: the loop over steps of a program (step number, numbers) -> the first `moving`.
 
-    Inputs are the counts of steps and of lanes, the moving numbers, and those that are `read`, given by their indices
-    after these, with True if they differ from lane to lane. There must be at least `width` lanes: the last vector
-    overlaps the one before it.
+    Inputs are XLA's buffers of the counts of steps and of lanes, the moving numbers, and those that are `read`, given
+    by their indices after these, with True if they differ from lane to lane. There must be at least `width` lanes: the
+    last vector overlaps the one before it.
     """
     w = Code(width)
-    pointer = lambda base, k: w.let(
-        f"load ptr, ptr {w.let(f'getelementptr ptr, ptr {base}, i64 {k}', 'ptr', False).text}", "ptr", False
-    )
-    vector = w.type("double", True)
-    count_at = pointer("%in", 0)
-    lanes_at = w.let(f"getelementptr i32, ptr {count_at.text}, i64 1", "ptr", False)
-    count, lanes = (w.let(f"load i32, ptr {x.text}", "i32", False) for x in (count_at, lanes_at))
-    count, lanes = (w.convert("sext", x, "i64") for x in (count, lanes))
-    inputs = [pointer("%in", 1 + k) for k in range(moving + len(read))]
-    outputs = [pointer("%out", k) for k in range(moving)]
-    shared = {
-        k: w.let(f"load double, ptr {inputs[moving + j].text}", "double", False)
-        for j, (k, wide) in enumerate(read)
-        if not wide
-    }
-    last = w.simple("sub", lanes, Value(str(width), "i64", False))
-    w.line("br label %vector")
-    w.line("vector:")
-    w.line("%from = phi i64 [ 0, %entry ], [ %from_next, %store ]")
-    start = w.call("smin", Value("%from", "i64", False), last)
-    at = lambda base: w.let(f"getelementptr double, ptr {base.text}, i64 {start.text}", "ptr", False)
-    load = lambda base: w.let(f"load {vector}, ptr {at(base).text}, align 8", "double", True)
-    begun = [load(x) for x in inputs[:moving]]
-    own = {k: load(inputs[moving + j]) for j, (k, wide) in enumerate(read) if wide}
-    w.line(f"%some = icmp sgt i64 {count.text}, 0")
-    w.line("br i1 %some, label %step, label %store")
-    before = w.taken()
+    buffer = lambda base, k: word(w, word(w, base, k), 3)  # word 3 of a buffer is the pointer to its data
+    counts = buffer("%in", 0)
+    steps, lanes = (w.convert("sext", w.load(w.element(counts, k, "i32"), "i32"), "i64") for k in (0, 1))
+    inputs = [buffer("%in", 1 + k) for k in range(moving + len(read))]
+    outputs = [buffer("%out", k) for k in range(moving)]
+    given = list(zip(read, inputs[moving:], strict=True))
+    shared = {k: w.load(x) for (k, wide), x in given if not wide}
+    last = w.sub(lanes, number(width))
 
-    state = [Value(f"%s{k}", "double", True) for k in range(moving)]
-    step_number = w.convert("sitofp", Value("%i", "i64", False), "double")
-    fixed = [shared.get(k, own.get(k, number(0.0))) for k in range(len(program.jaxpr.invars) - 1 - moving)]
-    w.block = "step"
-    results = [w.widened(x) for x in w.program(program, [step_number, *state, *fixed])]
-    body, latch = w.taken(), w.block
-    phis = "\n".join(
-        f"  {s.text} = phi {vector} [ {b.text}, %vector ], [ {r.text}, %{latch} ]"
-        for s, b, r in zip(state, begun, results, strict=True)
-    )
-    ends = "\n".join(
-        f"  %e{k} = phi {vector} [ {begun[k].text}, %vector ], [ {r.text}, %{latch} ]" for k, r in enumerate(results)
-    )
-    for k, x in enumerate(outputs):
-        w.line(f"store {vector} %e{k}, ptr {at(x).text}, align 8")
-    after = w.taken()
-    text = f"""define internal void @march(ptr %in, ptr %out) noinline {{
-entry:
-{before}
-step:
-  %i = phi i64 [ 0, %vector ], [ %i_next, %{latch} ]
-{phis}
-{body}
-  %i_next = add i64 %i, 1
-  %more = icmp slt i64 %i_next, {count.text}
-  br i1 %more, label %step, label %store
-store:
-{ends}
-{after}
-  %from_next = add i64 %from, {width}
-  %rest = icmp slt i64 %from_next, {lanes.text}
-  br i1 %rest, label %vector, label %return
-return:
-  ret void
-}}"""
-    return "\n".join([text, *sorted(w.declarations), '!0 = !{!"branch_weights", i32 1, i32 30}'])
+    def vector(start: Value, _: Any) -> None:
+        start = w.call("smin", start, last)
+        load = lambda x: w.load(w.element(x, start), wide=True, how=", align 8")
+        known = {**shared, **{k: load(x) for (k, wide), x in given if wide}}
+        fixed = [known.get(k, number(0.0)) for k in range(len(program.jaxpr.invars) - 1 - moving)]
+
+        def step(i: Value, state: list[Value]) -> list[Value]:
+            return [w.widened(x) for x in w.program(program, [w.convert("sitofp", i, "double"), *state, *fixed])]
+
+        for x, end in zip(outputs, w.loop(steps, [load(x) for x in inputs[:moving]], step), strict=True):
+            w.store(end, w.element(x, start), ", align 8")
+
+    w.loop(lanes, [], vector, width)
+    return w.function("march", "ptr %in, ptr %out")
 
 
 # --- the primitive -------------------------------------------------------------------------------------------------

@@ -57,7 +57,7 @@ def squared_error(w: Code, field: Field, rows: Layout, tableau: Tableau, step: V
         return [w.call("maximum", error[0], w.mul(relative, relative))]
 
     (error,) = w.over(n, [number(0.0)], worst)
-    for first_of in range(n, n * (1 + field.tangents), n) if field.careful else ():
+    for first_of in range(n, n * (1 + field.tangents), n) if field.relative else ():
 
         def sums(at: Any, old: list[Value], first_of: int = first_of) -> list[Value]:
             new, wrong = w.get(at(stage + first_of)), estimate(at, first_of)
