@@ -23,10 +23,10 @@ from ..models import (
     ScaledField,
     multiply,
 )
-from .ir import Code, Function, UnknownOperation, Value, is_variable, number
+from .ir import Code, Function, UnknownOperation, Value, number
 from .kernel import rosenbrock_step
 from .layout import Field, Layout, fixed_numbers, rates_arguments
-from .program import Program, Sizes, depends, needed, program_of
+from .program import Program, Sizes, depends, following, needed, program_of, variables
 
 
 PASSED, NORMAL = len(Passed._fields), Passed._fields.index("normal")
@@ -54,23 +54,13 @@ def _with_tangents(go: Callable[[Any], Any], numbers: Any, size: int, tangents: 
 def _hoisted(program: Program, moving: int) -> tuple[Program, Program]:
     """Split a program into one of the fixed numbers alone, and one with that one's results as further arguments."""
     jaxpr = program.jaxpr
-    known, early = {*jaxpr.invars[1 + moving :], *jaxpr.constvars}, []
-    for e in jaxpr.eqns:
-        if all(v in known for v in e.invars if is_variable(v)):
-            early.append(e)
-            known.update(e.outvars)
-    placed = set(map(id, early))
-    late = [e for e in jaxpr.eqns if id(e) not in placed]
-    wanted = {v for e in late for v in e.invars if is_variable(v)} | {v for v in jaxpr.outvars if is_variable(v)}
-    numbers = []
-    for e in reversed(early):
-        if e.outvars[0] in wanted and e.outvars[0].aval.dtype != np.dtype(float):  # recompute masks and integers
-            late = [e, *late]
-            wanted |= {v for v in e.invars if is_variable(v)}
-        else:
-            numbers.insert(0, e)
-    made = [v for e in numbers for v in e.outvars if v in wanted]
-    prelude = jaxpr.replace(invars=jaxpr.invars[1 + moving :], eqns=needed(numbers, made), outvars=made)
+    moved = following(jaxpr.eqns, jaxpr.invars[: 1 + moving])
+    # Masks and integers are computed again.
+    early = lambda e: e.outvars[0] not in moved and e.outvars[0].aval.dtype == np.dtype(float)
+    late = needed([e for e in jaxpr.eqns if not early(e)], jaxpr.outvars)
+    wanted = variables(jaxpr.outvars).union(*(variables(e.invars) for e in late))
+    made = [e.outvars[0] for e in jaxpr.eqns if early(e) and e.outvars[0] in wanted]
+    prelude = jaxpr.replace(invars=jaxpr.invars[1 + moving :], eqns=needed(jaxpr.eqns, made), outvars=made)
     rest = jaxpr.replace(invars=[*jaxpr.invars, *made], eqns=late)
     return Program(prelude, program.consts), Program(rest, program.consts)
 

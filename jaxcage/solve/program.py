@@ -22,8 +22,8 @@ CONTROL_FLOW = {"while", "scan", "cond"}
 STAYS_CALL = "evaluated_often"
 """Name of a function under `jax.jit` that a program calls several times, and that is differentiated only once."""
 
-_variables = lambda atoms: {v for v in atoms if not isinstance(v, jex.core.Literal)}
-_read = lambda equation: _variables(equation.invars)
+variables = lambda atoms: {v for v in atoms if not isinstance(v, jex.core.Literal)}
+_read = lambda equation: variables(equation.invars)
 _identity = lambda x: id(x) if isinstance(x, Tracer) else (np.asarray(x).dtype.str, np.asarray(x).tobytes())
 """Key that is equal for equal numbers."""
 
@@ -49,7 +49,7 @@ class Program(NamedTuple):
     @property
     def needed(self) -> list[int]:
         """Indices of the arguments that are used."""
-        read = _variables(self.jaxpr.outvars).union(*map(_read, self.jaxpr.eqns))
+        read = variables(self.jaxpr.outvars).union(*map(_read, self.jaxpr.eqns))
         return [i for i, v in enumerate(self.jaxpr.invars) if v in read]
 
     def __call__(self, *x: Any) -> list[Any]:
@@ -108,7 +108,7 @@ def following(equations: Sequence[Any], given: Sequence[Any]) -> set[Any]:
     """The given variables and all that depend on any of them."""
     found = set(given)
     for e in equations:
-        if found & _variables(e.invars):
+        if found & variables(e.invars):
             found.update(e.outvars)
     return found
 
@@ -117,15 +117,15 @@ def depends(f: Callable[[Any], Any], x: Any) -> list[bool]:
     """True for each array of f(x) that depends on x."""
     jaxpr = jax.make_jaxpr(f)(x).jaxpr
     reached = following(jaxpr.eqns, jaxpr.invars)
-    return [bool(reached & _variables([v])) for v in jaxpr.outvars]
+    return [bool(reached & variables([v])) for v in jaxpr.outvars]
 
 
 def needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
     """Equations on which the wanted variables depend, in their order."""
-    reached = _variables(wanted)
+    reached = variables(wanted)
     kept = []
     for e in reversed(equations):
         if reached.intersection(e.outvars):
             kept.append(e)
-            reached |= _variables(e.invars)
+            reached |= variables(e.invars)
     return kept[::-1]
