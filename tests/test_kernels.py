@@ -65,6 +65,17 @@ def test_a_march_is_its_steps_one_by_one_in_one_lane_and_in_many():
         np.testing.assert_allclose(got, expected, rtol=1e-12)
 
 
+def test_each_lane_may_take_another_number_of_steps():
+    counts = jnp.array([0, 3, 48, 5, 1, 12, 2])
+    each = [by_loop(z, int(count)) for z, count in zip(LANES, counts, strict=True)]
+    got, peak = jax.vmap(by_march)(LANES, counts)
+    np.testing.assert_allclose(got, [z for z, _ in each], rtol=1e-12)
+    np.testing.assert_allclose(peak, [p for _, p in each], rtol=1e-12)
+    slope = lambda z, count: jax.jacfwd(lambda z: by_march(z, count)[0])(z)
+    np.testing.assert_allclose(jax.vmap(slope)(LANES, counts)[2], slope(LANES[2], 48), rtol=1e-12)
+    assert jax.vmap(by_march)(LANES[:0], counts[:0])[0].shape == (0, 2)
+
+
 @pytest.mark.wide
 @pytest.mark.parametrize("order, tolerance", [(1, 1e-12), (2, 1e-10), (3, 1e-8)])
 def test_derivatives_of_a_march_of_any_order(order, tolerance):

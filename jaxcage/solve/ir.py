@@ -268,6 +268,12 @@ class Code:
         """The bits of a mask as one integer."""
         return self.let(f"bitcast {self.typed(mask)} to i{self.width}", f"i{self.width}")
 
+    def largest(self, v: Value) -> Value:
+        """Largest number of a vector."""
+        name = f"@llvm.vector.reduce.fmax.v{self.width}f64"
+        self.declarations.add(f"declare double {name}({self.type('double', True)})")
+        return self.let(f"call double {name}({self.typed(v)})", "double")
+
     def convert(self, op: str, x: Value, kind: str) -> Value:
         return self.let(f"{op} {self.typed(x)} to {self.type(kind, x.wide)}", kind, x.wide)
 

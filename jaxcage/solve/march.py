@@ -154,31 +154,6 @@ class Tangent:
         return (*value, *out), seen
 
 
-@dataclasses.dataclass(frozen=True)
-class Limited:
-    """A step for lanes that stop after individual counts, the first fixed number."""
-
-    step: Step
-
-    def __call__(self, i: Any, moved: Numbers, watched: Numbers, fixed: Numbers) -> tuple[Numbers, Numbers]:
-        count, *rest = fixed
-        new, seen = self.step(i, moved, watched, tuple(rest))
-        keep = lambda a, b: tuple(jnp.where(i < count, x, y) for x, y in zip(a, b, strict=True))
-        return keep(new, moved), keep(seen, watched)
-
-
-def _limited(step: Any) -> Any:
-    """Step that stops after an individual count, with tangents outermost."""
-    if not isinstance(step, Tangent):
-        return Limited(step)
-    known = tuple((False, *row) for row in step.known)
-    return Tangent(_limited(step.step), _one_more(step.sizes), known)
-
-
-def _one_more(sizes: Sizes) -> Sizes:
-    return sizes._replace(fixed=sizes.fixed + 1)
-
-
 def _share(tangent: Tangent) -> bool:
     """True if all directions of a step are computed together, which is not done for higher derivatives."""
     return not isinstance(tangent.step, Tangent) and len(tangent.known) <= DIRECTIONS
@@ -208,43 +183,52 @@ def _plain(step: Step, count: Any, moved: Numbers, watched: Numbers, fixed: Numb
     return jax.lax.fori_loop(0, count, body, (moved, tuple(jax.lax.stop_gradient(x) for x in watched)))
 
 
+def _shape_of(*numbers: Any) -> tuple[int, ...]:
+    """Shape of the lanes, which numbers that are common to all of them do not have."""
+    return max((x.shape for x in numbers), key=len)
+
+
 def _inside_jax(count: Array, *numbers: Array, how: How) -> list[Array]:
     """Loop in JAX without machine code; numbers common to all lanes are scalars."""
 
-    def lane(*numbers: Array) -> list[Array]:
+    def lane(count: Array, *numbers: Array) -> list[Array]:
         out = _plain(how.step, count, *how.sizes.split(numbers))
         return [*out[0], *out[1]]
 
-    for _ in range(max(len(x.shape) for x in numbers)):
-        lane = jax.vmap(lane, in_axes=tuple(0 if x.shape else None for x in numbers))
-    return lane(*numbers)
+    for _ in _shape_of(count, *numbers):
+        lane = jax.vmap(lane, in_axes=tuple(0 if x.shape else None for x in (count, *numbers)))
+    return lane(count, *numbers)
 
 
 def _on_cpu(count: Array, *numbers: Array, how: How) -> list[Array]:
     """Call of machine code: a loop over vectors of lanes around one over steps."""
-    shape = max((x.shape for x in numbers), key=len)
+    shape = _shape_of(count, *numbers)
     lanes, moving = math.prod(shape), how.sizes.moved + how.sizes.watched
     wide = tuple(bool(x.shape) for x in numbers[moving:])
     width = min(WIDTH, 1 << (lanes.bit_length() - 1)) if lanes else 1
-    found = code_of(how.step, how.sizes, wide, width)
+    found = code_of(how.step, how.sizes, wide, width, bool(count.shape))
     if found is None:
         return _inside_jax(count, *numbers, how=how)
     name, read = found
-    row = [jnp.broadcast_to(x, shape).reshape(lanes) for x in numbers[:moving]]
+    each = lambda x: jnp.broadcast_to(x, shape).reshape(lanes)
+    row, limit = [each(x) for x in numbers[:moving]], [each(count.astype(float))] if count.shape else []
     given = [numbers[moving + k].reshape((lanes,) if wide[k] else ()) for k in read]
     call = jax.ffi.ffi_call(name, [jax.ShapeDtypeStruct((lanes,), float)] * moving)
-    return [x.reshape(shape) for x in call(jnp.stack([count, jnp.int32(lanes)]), *row, *given)]
+    counts = jnp.stack([jnp.max(count, initial=0), jnp.int32(lanes)])
+    return [x.reshape(shape) for x in call(counts, *row, *given, *limit)]
 
 
 @functools.lru_cache(maxsize=256)
-def code_of(step: Any, sizes: Sizes, wide: tuple[bool, ...], width: int) -> tuple[str, tuple[int, ...]] | None:
+def code_of(
+    step: Any, sizes: Sizes, wide: tuple[bool, ...], width: int, limited: bool
+) -> tuple[str, tuple[int, ...]] | None:
     """XLA's name for the machine code of a step, and the indices of the fixed numbers it reads; None, after a warning,
     if the step cannot be translated."""
     moving = sizes.moved + sizes.watched
     program = program_of(step, sizes)
     read = tuple(i - 1 - moving for i in program.needed if i > moving)
     try:
-        ir = module(loop_ir(program, moving, [(k, wide[k]) for k in read], width), handler())
+        ir = module(loop_ir(program, moving, [(k, wide[k]) for k in read], width, limited), handler())
     except (UnknownOperation, UnknownInterface) as unknown:
         say_once(str(unknown))
         return None
@@ -253,20 +237,20 @@ def code_of(step: Any, sizes: Sizes, wide: tuple[bool, ...], width: int) -> tupl
     return name, read
 
 
-def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: int) -> Function:
+def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: int, limited: bool) -> Function:
     """Code of `march(inputs, outputs)`: the loop over steps of a program (step number, numbers) -> the first `moving`.
 
     Inputs are XLA's buffers of the counts of steps and of lanes, the moving numbers, and those that are `read`, given
-    by their indices after these, with True if they differ from lane to lane. There must be at least `width` lanes: the
-    last vector overlaps the one before it.
+    by their indices after these, with True if they differ from lane to lane; if `limited`, also the count of each lane.
+    There must be at least `width` lanes: the last vector overlaps the one before it.
     """
     w = Code(width)
     buffer = lambda base, k: word(w, word(w, base, k), 3)  # word 3 of a buffer is the pointer to its data
     counts = buffer("%in", 0)
     steps, lanes = (w.convert("sext", w.load(w.element(counts, k, "i32"), "i32"), "i64") for k in (0, 1))
-    inputs = [buffer("%in", 1 + k) for k in range(moving + len(read))]
+    inputs = [buffer("%in", 1 + k) for k in range(moving + len(read) + limited)]
     outputs = [buffer("%out", k) for k in range(moving)]
-    given = list(zip(read, inputs[moving:], strict=True))
+    given = list(zip(read, inputs[moving:], strict=False))
     shared = {k: w.load(x) for (k, wide), x in given if not wide}
     last = w.sub(lanes, number(width))
 
@@ -276,10 +260,18 @@ def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: 
         known = {**shared, **{k: load(x) for (k, wide), x in given if wide}}
         fixed = [known.get(k, number(0.0)) for k in range(len(program.jaxpr.invars) - 1 - moving)]
 
-        def step(i: Value, state: list[Value]) -> list[Value]:
-            return [w.widened(x) for x in w.program(program, [w.convert("sitofp", i, "double"), *state, *fixed])]
+        limit = load(inputs[-1]) if limited else None
+        end = w.convert("fptosi", w.largest(limit), "i64") if limit else steps
 
-        for x, end in zip(outputs, w.loop(steps, [load(x) for x in inputs[:moving]], step), strict=True):
+        def step(i: Value, state: list[Value]) -> list[Value]:
+            number_of = w.convert("sitofp", i, "double")
+            new = [w.widened(x) for x in w.program(program, [number_of, *state, *fixed])]
+            if limit is None:
+                return new
+            goes_on = w.compare("lt", number_of, limit)
+            return [w.select(goes_on, a, b) for a, b in zip(new, state, strict=True)]
+
+        for x, end in zip(outputs, w.loop(end, [load(x) for x in inputs[:moving]], step), strict=True):
             w.store(end, w.element(x, start), ", align 8")
 
     w.loop(lanes, [], vector, width)
@@ -293,33 +285,24 @@ march_p.multiple_results = True
 
 
 def _abstract(count: Any, *numbers: Any, how: How) -> list[Any]:
-    del count
-    like = max(numbers, key=lambda x: len(x.shape))
-    return [like] * (how.sizes.moved + how.sizes.watched)
+    return [numbers[0].update(shape=_shape_of(count, *numbers))] * (how.sizes.moved + how.sizes.watched)
 
 
 def _batch(args: Sequence[Any], dims: Sequence[Any], *, how: How) -> Any:
     mapped = [d is not None for d in dims]
     size = next(x.shape[d] for x, d, m in zip(args, dims, mapped, strict=True) if m)
     args = [jnp.moveaxis(x, d, 0) if m else x for x, d, m in zip(args, dims, mapped, strict=True)]
-    results = how.sizes.moved + how.sizes.watched
-    if mapped[0]:  # lanes with individual counts
-        count, *numbers = args
-        args = [jnp.max(count), *numbers[:results], count.astype(float), *numbers[results:]]
-        mapped = [False, *mapped[1 : 1 + results], True, *mapped[1 + results :]]
-        how = How(_limited(how.step), _one_more(how.sizes))
     if isinstance(how.step, Tangent):
         moved, watched, fixed = how.sizes.split(mapped[1:])
         inner = how.step.sizes
-        if not any((*moved[: inner.moved], *watched, *fixed[: inner.fixed])):
+        if not any((mapped[0], *moved[: inner.moved], *watched, *fixed[: inner.fixed])):
             return _directions(args, mapped, size, how)
-    return _lanes(args, mapped, size, how), [0] * results
+    return _lanes(args, mapped, size, how), [0] * (how.sizes.moved + how.sizes.watched)
 
 
 def _lanes(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How) -> Any:
     """Batch all numbers, with the new axis first; numbers common to all lanes remain scalars."""
-    count, *numbers = args
-    shape = max((x.shape[m:] for x, m in zip(numbers, mapped[1:], strict=True)), key=len)
+    shape = max((x.shape[m:] for x, m in zip(args, mapped, strict=True)), key=len)
 
     def spread(x: Any, m: bool) -> Any:
         if not m and not x.shape:
@@ -327,7 +310,7 @@ def _lanes(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How) -> 
         x = x if m else x[None]
         return jnp.broadcast_to(x.reshape(x.shape + (1,) * (1 + len(shape) - x.ndim)), (size, *shape))
 
-    return march_p.bind(count, *map(spread, numbers, mapped[1:]), how=how)
+    return march_p.bind(*map(spread, args, mapped), how=how)
 
 
 def _directions(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How) -> Any:
