@@ -20,7 +20,7 @@ def march(system: Any, speed: np.ndarray, y: np.ndarray, revolutions: int, toler
     method = jc.native(tolerance, pair=more.pop("pair", "tsit5"))
     engine = engine_of(system, 0, False, method)
     assert isinstance(engine, Engine)
-    return engine(engine.numbers(Lanes.of([system], speed)), y, revolutions, revolutions, method, **more)
+    return engine(Lanes.of([system], speed), y, revolutions, revolutions, method, **more)
 
 
 def begin(model: jc.CageModel, speed: np.ndarray, which: int = 0) -> np.ndarray:

@@ -23,8 +23,7 @@ def run_samples(model, states, samples, tolerance, direction=None, **more):
     if direction is not None:
         tangents = np.tile(direction, (len(y), 1, 1))
     engine = lanes.engine(0 if direction is None else 1, method, 16)
-    numbers = lanes.numbers(engine, every)
-    return engine(numbers, y, samples, samples, method, tangents=tangents, **{"step": 1e-4} | more), y
+    return engine(lanes, y, samples, samples, method, tangents=tangents, **{"step": 1e-4} | more), y
 
 
 def in_units(model, state):

@@ -203,7 +203,7 @@ class _Observer:
                 break
             plain = self.lanes.engine(0, method, samples)
             engine = self.lanes.engine(run.exponents, method, samples) if pushed else plain
-            numbers = self.lanes.numbers(engine, some[alive])
+            lanes = self.lanes.at(some[alive])
             seen = stop == end or begin >= run.discard
             if begin == 0 or (self.averages and seen):
                 error[alive] = np.maximum(error[alive], self._error(plain, some[alive], state[alive, None], method))
@@ -213,7 +213,7 @@ class _Observer:
             report = lambda lanes, length=stop - begin: self.report(self.done + lanes * length)
             more = {"tangents": tangents[alive]} if pushed and run.exponents else {}
             more |= {"step": step[alive], "threads": cores(), "report": report}
-            ran = engine(numbers, before, strobes, held if seen else 1, method, **more)
+            ran = engine(lanes, before, strobes, held if seen else 1, method, **more)
             self.done += alive.size * (stop - begin)
             state[alive], step[alive], outcome[alive] = ran.state, ran.step, ran.outcome
             if pushed and run.exponents:
@@ -238,7 +238,7 @@ class _Observer:
             found.strobe[alive] = np.concatenate([found.strobe[alive], latest], axis=1)[:, -run.keep :]
             peak[alive] = np.fmax(peak[alive], np.maximum(ran.peak, begun))
             if pushed and run.exponents:
-                found.doubt[alive] = self._doubt(engine, numbers, ran, method)
+                found.doubt[alive] = self._doubt(engine, lanes, ran, method)
             if held > 1:
                 last_ones = ran.strobe[:, -(CHECKED + 1) :]
                 error[alive] = np.maximum(error[alive], self._error(plain, some[alive], last_ones, method))
@@ -253,12 +253,12 @@ class _Observer:
 
     @staticmethod
     def _doubt(
-        engine: Engine | JaxEngine, numbers: Any, ran: March, method: AbstractMethod
+        engine: Engine | JaxEngine, lanes: Lanes, ran: March, method: AbstractMethod
     ) -> Float[np.ndarray, "some exponents"]:
         """Integration error of the exponents per revolution: three times the difference of the mean growth over a few
         further revolutions from that by the method's reference."""
         options: dict[str, Any] = dict(tangents=ran.tangents, step=ran.step, threads=cores())
-        further = lambda chosen: engine(numbers, ran.state, FURTHER, 1, chosen, **options).growth.mean(axis=1)
+        further = lambda chosen: engine(lanes, ran.state, FURTHER, 1, chosen, **options).growth.mean(axis=1)
         return SURE * np.abs(further(method) - further(method.reference))
 
     def _error(
@@ -274,13 +274,13 @@ class _Observer:
         A stretch is a revolution, or as much of one as two runs can be compared over; for a single state it is the
         stretch that follows.
         """
-        numbers, more = self.lanes.numbers(engine, some), {}
+        lanes, more = self.lanes.at(some), {}
         if self.averages:
             more["turn"] = np.array([self.model.comparable(speed) for speed in self.lanes.speed[some].tolist()])
         if states.shape[1] == 1:
-            ends = engine(numbers, states[:, 0], 1, 1, method, threads=cores(), **more).state
+            ends = engine(lanes, states[:, 0], 1, 1, method, threads=cores(), **more).state
             states = np.stack([states[:, 0], ends], axis=1)
-        apart = errors_of_parts(engine, numbers, states, self.model.dimension, method, **more)
+        apart = errors_of_parts(engine, lanes, states, method, **more)
         return np.maximum(np.max(np.nan_to_num(apart, posinf=np.inf), axis=1), getattr(method, "tolerance", 0.0))
 
 

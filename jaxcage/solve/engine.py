@@ -98,13 +98,9 @@ class Engine:
         shared = np.array([x[0] for x, w in zip(found, self._wide, strict=True) if not w], dtype=float)
         return LaneNumbers(wide.reshape(-1, lanes.speed.size), shared, slow)
 
-    @staticmethod
-    def picked(numbers: Any, lanes: Any) -> Any:
-        return numbers._replace(wide=numbers.wide[:, lanes], slow=numbers.slow[lanes])
-
     def __call__(
         self,
-        numbers: LaneNumbers,
+        lanes: "Lanes",
         state: Float[np.ndarray, "lanes numbers"],
         strobes: int,
         keep: int,
@@ -119,41 +115,41 @@ class Engine:
     ) -> March:
         """Run lanes from states in units of their scales, followed by the values of additional integrands.
 
-        **Arguments:** numbers of the lanes; states; number of strobe states to run, and to keep; a method with a
+        **Arguments:** lanes; states; number of strobe states to run, and to keep; a method with a
         tolerance; `begin`, index of the first state among the samples of a revolution; `turn`, phase from strobe to
         strobe if it is not a revolution over its samples; tangent vectors in units of the scale; first step, NaN for
         the default; number of threads; function called with the work done, in lanes. `begin`, `turn` and `step`
         hold for all lanes or are arrays over lanes.
         """
-        lanes, field, rows = len(state), self.field, self._rows
+        numbers, count, field, rows = lanes.numbers(self), len(state), self.field, self._rows
         n, moving = field.dimension, field.moving
         limits, more = self._limits, max(1.0, MOST_AT / method.tolerance) ** (1 / self._order)
-        loaded = np.zeros((rows["first_step"].stop, lanes))
+        loaded = np.zeros((rows["first_step"].stop, count))
         loaded[:n], loaded[moving - field.beside : moving] = state[:, :n].T, state[:, n:].T
         if field.tangents:
             assert tangents is not None
-            loaded[n : moving - field.beside] = tangents.reshape(lanes, -1).T
-        given = np.broadcast_to(np.nan if step is None else step, lanes)
+            loaded[n : moving - field.beside] = tangents.reshape(count, -1).T
+        given = np.broadcast_to(np.nan if step is None else step, count)
         loaded[rows["step"][0]] = np.where(np.isnan(given), limits.first, given)
         loaded[rows["most"][0]] = limits.most * numbers.slow * more
         loaded[rows["peak"]] = 0.0 if field.excursion is not None else -np.inf
         loaded[rows["turn"][0]], loaded[rows["begin"][0]] = REVOLUTION / self._samples if turn is None else turn, begin
         loaded[rows["fixed"].start : rows["fixed"].stop] = numbers.wide
-        stored = np.zeros((rows["mark"].stop, lanes))
-        strobe = np.full((lanes, keep, field.recorded), np.nan)
-        growth = np.full((lanes, strobes, field.tangents), np.nan)
+        stored = np.zeros((rows["mark"].stop, count))
+        strobe = np.full((count, keep, field.recorded), np.nan)
+        growth = np.full((count, strobes, field.tangents), np.nan)
         queue = np.zeros(3, dtype=np.int64)
         settings = np.array([method.tolerance, limits.longest, limits.shortest])
         arrays = (queue, settings, np.append(numbers.shared, 0.0), loaded, stored, strobe, growth)
         at = [x.ctypes.data for x in arrays]
         # For a large law a vector of one lane is faster than a vector of eight with a single lane in it.
-        width = 1 if field.excursion is None and lanes == 1 else WIDTH
+        width = 1 if field.excursion is None and count == 1 else WIDTH
         march = self._compiled(width)
-        run = lambda: march(at[0], lanes, strobes, keep, *at[1:])
-        if lanes == 1 and strobes <= self._samples:  # shorter than the start of a thread
+        run = lambda: march(at[0], count, strobes, keep, *at[1:])
+        if count == 1 and strobes <= self._samples:  # shorter than the start of a thread
             run()
         else:
-            _run_threads(run, min(threads, -(-lanes // width)), queue, lambda: report(int(queue[2]) / strobes))
+            _run_threads(run, min(threads, -(-count // width)), queue, lambda: report(int(queue[2]) / strobes))
         part = lambda name: stored[rows[name][0]]
         turned = np.roll(strobe, -strobes % keep, axis=1)  # the latest last
         numbers_of, peaks = n + field.beside, part("peak")[:, None, None]
@@ -164,7 +160,7 @@ class Engine:
         end = np.concatenate([stored[:n], stored[moving - field.beside : moving]])
         return March(
             state=end.T.copy(),
-            tangents=stored[n : moving - field.beside].T.reshape(lanes, field.tangents, n),
+            tangents=stored[n : moving - field.beside].T.reshape(count, field.tangents, n),
             step=part("step"),
             peaks=peaks,
             steps=part("steps"),
@@ -224,20 +220,13 @@ def _orthonormalised(
 
 
 class JaxEngine:
-    """Integration loop inside JAX, called like `Engine` with lanes as their own numbers.
+    """Integration loop inside JAX, called like `Engine`.
 
     **Arguments:** number of tangent vectors; strobe states per revolution.
     """
 
     def __init__(self, tangents: int, samples: int):
         self._tangents, self._samples = tangents, samples
-
-    def numbers(self, lanes: "Lanes") -> "Lanes":
-        return lanes
-
-    @staticmethod
-    def picked(lanes: Any, some: Int[np.ndarray, " some"]) -> Any:
-        return lanes.at(some)
 
     def __call__(
         self,
@@ -331,7 +320,7 @@ class Lanes:
         self.several, self.which, self.speed = count > 1, which, speed
         self._rows = [np.asarray(x) for x in rows]
         self._all, self._place = self, np.arange(speed.size)
-        self._numbers: dict[type, Any] = {}
+        self._numbers: LaneNumbers | None = None
 
     @classmethod
     def of(
@@ -365,11 +354,10 @@ class Lanes:
         """Numbers of the designs of some lanes, or those common to all."""
         return [x[self.which[lanes]] for x in self._rows] if self.several else self._rows
 
-    def numbers(self, engine: Engine | JaxEngine, some: Int[np.ndarray, " some"]) -> Any:
-        """Numbers of some lanes as the engine takes them, computed once for all lanes."""
-        if type(engine) not in self._numbers:
-            self._numbers[type(engine)] = engine.numbers(self._all)
-        return engine.picked(self._numbers[type(engine)], self._place[some])
+    def numbers(self, engine: Engine) -> LaneNumbers:
+        """Numbers of the field in these lanes, computed once for all lanes of which they are a part."""
+        found = self._all._numbers = self._all._numbers or engine.numbers(self._all)
+        return found._replace(wide=found.wide[:, self._place], slow=found.slow[self._place])
 
     def engine(self, tangents: int, method: AbstractMethod, samples: int = 1) -> Engine | JaxEngine:
         return engine_of(self.system, tangents, self.several, method, samples)
@@ -429,11 +417,11 @@ def histories(
         for some in np.split(todo, range(size, todo.size, size)) if todo.size else ():
             scale, _ = lanes.begin(some, y0[some])
             engine = lanes.engine(0, chosen, samples)
-            numbers = lanes.numbers(engine, some)
-            ran = engine(numbers, y0[some] / scale, total, total, chosen, threads=cores())
+            few = lanes.at(some)
+            ran = engine(few, y0[some] / scale, total, total, chosen, threads=cores())
             states = np.concatenate([(y0[some] / scale)[:, None], ran.strobe], axis=1)
             begin = np.tile(np.arange(total) % samples, some.size)
-            apart = errors_of_parts(engine, numbers, states, lanes.system.dimension, chosen, begin=begin)
+            apart = errors_of_parts(engine, few, states, chosen, begin=begin)
             error[some] = errors_of_stretches(apart, samples, chosen).max(axis=1)
             seen[some] = states[:, :-1] * scale[:, None, :]
         todo = np.flatnonzero(error > method.allowed)
@@ -442,20 +430,17 @@ def histories(
 
 def errors_of_parts(
     engine: Engine | JaxEngine,
-    numbers: Any,
+    lanes: Lanes,
     states: Float[np.ndarray, "lanes states numbers"],
-    dimension: int,
     method: AbstractMethod,
     **more: Any,
 ) -> Float[np.ndarray, "lanes parts"]:
     """Error of each part of a run between `states` [scale]: three times the distance of its end from that by the
     method's reference, infinite where that fails; `more` are arguments of the engine for each part."""
     count, parts = states.shape[0], states.shape[1] - 1
-    begins, given = (
-        states[:, :-1].reshape(count * parts, -1),
-        engine.picked(numbers, np.repeat(np.arange(count), parts)),
-    )
-    sharper = engine(given, begins, 1, 1, method.reference, threads=cores(), **more).state
+    begins, each = states[:, :-1].reshape(count * parts, -1), lanes.at(np.repeat(np.arange(count), parts))
+    dimension = lanes.system.dimension
+    sharper = engine(each, begins, 1, 1, method.reference, threads=cores(), **more).state
     apart = np.max(np.abs(sharper.reshape(count, parts, -1) - states[:, 1:])[..., :dimension], axis=2)
     ran = np.all(np.isfinite(states[..., :dimension]), axis=2)
     return SURE * np.where(ran[:, :-1] & ran[:, 1:] & np.isnan(apart), np.inf, apart)

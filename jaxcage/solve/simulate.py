@@ -136,17 +136,16 @@ class _Ran(NamedTuple):
 def _run(lanes: Lanes, samples: int, stretch: int, start: np.ndarray, method: AbstractMethod) -> _Ran:
     """Run parts one after the other, each a lane at its own speed: `samples` per revolution, and one error for every
     `stretch` of them."""
-    n, speed, dim = lanes.speed.size, lanes.speed, lanes.system.dimension
+    n, speed = lanes.speed.size, lanes.speed
     every, begin = np.arange(n), np.arange(n) % samples
     engine = lanes.engine(0, method, samples)
-    numbers = lanes.numbers(engine, every)
     scale, (excursion, *_) = lanes.begin(every, np.broadcast_to(start, (n, start.size)))
     y, peaks = np.full((n + 1, start.size), np.nan), np.full((n, len(lanes.system.watched)), np.nan)
     y[0], code = start, 0 if excursion <= 1 or lanes.system.beside else OUTSIDE
     step, done, steps = None, 0, 0.0
     while done < n and code == 0:  # a whole revolution at a time if its speed is constant
         some = samples if done + samples <= n and speed[done + samples - 1] == speed[done] else 1
-        at, first = engine.picked(numbers, every[done : done + 1]), y[done : done + 1] / scale[done]
+        at, first = lanes.at(every[done : done + 1]), y[done : done + 1] / scale[done]
         ran = engine(at, first, some, some, method, step=step, begin=begin[done : done + 1])
         y[done + 1 : done + 1 + some], code = ran.strobe[0] * scale[done], int(ran.outcome[0])
         step, steps = ran.step if ran.step[0] else step, steps + float(ran.steps[0])
@@ -157,8 +156,7 @@ def _run(lanes: Lanes, samples: int, stretch: int, start: np.ndarray, method: Ab
     apart = np.zeros(n)
     for some in np.split(ends, range(CHUNK, ends.size, CHUNK)) if ends.size else ():
         states = np.stack([y[some], y[some + 1]], axis=1) / scale[some, None]
-        own = engine.picked(numbers, some)
-        apart[some] = errors_of_parts(engine, own, states, dim, method, begin=begin[some])[:, 0]
+        apart[some] = errors_of_parts(engine, lanes.at(some), states, method, begin=begin[some])[:, 0]
     return _Ran(y, peaks, errors_of_stretches(apart, stretch, method), code, steps)
 
 
