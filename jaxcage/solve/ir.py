@@ -377,27 +377,25 @@ class Code:
     def loop(
         self, end: Value, begin: Sequence[Value], body: Callable[[Value, list[Value]], Any], step: int = 1
     ) -> list[Value]:
-        """Apply `body(number, values)` to `begin` and then to its results, for numbers from 0 to `end` by `step`."""
+        """Apply `body(number, values)` to `begin` and then to its results, for numbers from 0 to `end`, which is
+        positive, by `step`."""
         self.names += 1
-        name, before = f"%n{self.names}", self.block
-        head, inside, after = (f"{part}{self.names}" for part in ("loop", "inside", "done"))
+        name, before, head, after = f"%n{self.names}", self.block, f"loop{self.names}", f"done{self.names}"
         values = [v._replace(text=f"{name}_{k}") for k, v in enumerate(begin)]
-        outer, self.lines = self.lines, []
-        self.line(f"{inside}:")
-        new = body(Value(name, "i64"), values) or ()
+        outer, self.lines, self.block = self.lines, [], head
+        new = list(body(Value(name, "i64"), values) or ())
         latch, lines, self.lines = self.block, self.lines, outer
         self.line(f"br label %{head}")
         self.line(f"{head}:")
         self.line(f"{name} = phi i64 [ 0, %{before} ], [ {name}_next, %{latch} ]")
         for v, first, later in zip(values, begin, new, strict=True):
             self.line(f"{v} = phi {self.type(v.kind, v.wide)} [ {first}, %{before} ], [ {later}, %{latch} ]")
-        self.line(f"{name}_more = icmp slt i64 {name}, {end}")
-        self.line(f"br i1 {name}_more, label %{inside}, label %{after}")
         self.lines += lines
         self.line(f"{name}_next = add i64 {name}, {step}")
-        self.line(f"br label %{head}")
+        self.line(f"{name}_more = icmp slt i64 {name}_next, {end}")
+        self.line(f"br i1 {name}_more, label %{head}, label %{after}")
         self.line(f"{after}:")
-        return values
+        return new
 
     def function(self, name: str, arguments: str, result: Value | None = None, linkage: str = "internal ") -> Function:
         """The lines written as a function, and its declarations."""

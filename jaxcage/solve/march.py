@@ -205,8 +205,8 @@ def _on_cpu(count: Array, *numbers: Array, how: How) -> list[Array]:
     shape = _shape_of(count, *numbers)
     lanes, moving = math.prod(shape), how.sizes.moved + how.sizes.watched
     wide = tuple(bool(x.shape) for x in numbers[moving:])
-    width = min(WIDTH, 1 << (lanes.bit_length() - 1)) if lanes else 1
-    found = code_of(how.step, how.sizes, wide, width, bool(count.shape))
+    width = min(WIDTH, 1 << lanes.bit_length() >> 1)
+    found = code_of(how.step, how.sizes, wide, width, bool(count.shape)) if lanes else None
     if found is None:
         return _inside_jax(count, *numbers, how=how)
     name, read = found
@@ -271,8 +271,10 @@ def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: 
             goes_on = w.compare("lt", number_of, limit)
             return [w.select(goes_on, a, b) for a, b in zip(new, state, strict=True)]
 
-        for x, end in zip(outputs, w.loop(end, [load(x) for x in inputs[:moving]], step), strict=True):
-            w.store(end, w.element(x, start), ", align 8")
+        begun = [load(x) for x in inputs[:moving]]
+        ends = w.when(w.compare("gt", end, number(0)), lambda: w.loop(end, begun, step), otherwise=begun)
+        for x, value in zip(outputs, ends, strict=True):
+            w.store(value, w.element(x, start), ", align 8")
 
     w.loop(lanes, [], vector, width)
     return w.function("march", "ptr %in, ptr %out")
