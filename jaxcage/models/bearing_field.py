@@ -141,10 +141,6 @@ class BearingAtSpeed(AbstractField):
         """Factor from rates over time to rates over the cage's angle, counted in its sense."""
         return 1 / jnp.abs(cage_speed)
 
-    def lost(self, cage_speed: Scalar, eps: Scalar) -> Array:
-        """The eccentricity ratio, or `LOST` where the cage turns too slowly for its angle to measure progress."""
-        return jnp.where(jnp.abs(cage_speed) < STALLED * jnp.abs(self.rolling_cage_speed), LOST, eps)
-
     @property
     def places(self) -> np.ndarray:
         """Angles of the pockets in the cage [rad]."""
@@ -152,9 +148,12 @@ class BearingAtSpeed(AbstractField):
 
     def forces(self, state: BearingState) -> Forces:
         """Every contact at a state."""
-        rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
+        return self.on_rollers(state)._replace(land=self.on_land(Bodies(*state.bodies)))
+
+    def on_rollers(self, state: BearingState) -> Forces:
+        """Every contact of the rollers."""
         each = jax.vmap(self.on_roller, in_axes=(0, None, 0, 0))
-        return each(rollers, cage, *self.pockets(state.clock[0]))._replace(land=self.on_land(cage))
+        return each(Rollers(*state.rollers), Bodies(*state.bodies), *self.pockets(state.clock[0]))
 
     def pockets(self, angle: Scalar) -> tuple[Array, Array]:
         """Cosine and sine of the pockets' angles at an angle of the cage."""
@@ -217,18 +216,14 @@ class BearingAtSpeed(AbstractField):
 
     def rates(self, state: BearingState) -> Rates:
         """Rates over time."""
-        f, rollers, cage = self.forces(state), Rollers(*state.rollers), Bodies(*state.bodies)
-        assert f.land is not None
-        alone = f._replace(land=None)
-        roller_rates, passed = jax.vmap(self.roller_rates, in_axes=(0, None, 0))(rollers, cage, alone)
+        rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
+        each = jax.vmap(self.roller_rates, in_axes=(0, None, 0))
+        roller_rates, passed = each(rollers, cage, self.on_rollers(state))
         sums = Passed(*jnp.sum(jnp.stack(passed), axis=1))
-        body_rates, integrals = self.body_rates(cage, cos_sin(state.clock[0]), sums, f.land)
-        slip = jnp.max(self.slip(rollers.spin))
-        lost = self.lost(cage.cage_speed, f.land.eps)
-        watched = jnp.stack([lost, jnp.max(f.pocket.normal), f.land.size, slip, f.land.eps])
-        clock = jnp.stack([cage.cage_speed, jnp.ones_like(cage.cage_speed)])
-        moved = BearingState(jnp.stack(roller_rates), jnp.stack(body_rates), clock)
-        return Rates(moved, jnp.stack(integrals), watched)
+        largest = jnp.max(passed.normal), jnp.max(self.slip(rollers.spin))
+        body_rates, beside, watched = self.body_rates(cage, cos_sin(state.clock[0]), sums, largest)
+        moved = BearingState(jnp.stack(roller_rates), jnp.stack(body_rates), jnp.stack(beside[:2]))
+        return Rates(moved, jnp.stack(beside[2:]), jnp.stack(watched))
 
     def slip(self, spin: Many) -> Array:
         """Slip of a roller's spin against pure rolling, 0 where rollers that roll do not turn but for rounding."""
@@ -277,12 +272,15 @@ class BearingAtSpeed(AbstractField):
         return tuple(map(jnp.asarray, rates)), passed
 
     def body_rates(
-        self, cage: Bodies, phase: tuple[Scalar, Scalar], sums: Passed, land: LandForces
-    ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-        """Rates of cage and inner ring under the sums over all rollers; rates of the integrals, as in `INTEGRATED`.
+        self, cage: Bodies, phase: tuple[Scalar, Scalar], sums: Passed, largest: tuple[Scalar, Scalar]
+    ) -> tuple[tuple[Array, ...], tuple[Array, ...], tuple[Array, ...]]:
+        """Rates of cage and inner ring under the sums over all rollers; rates of the quantities beside the state, as in
+        `BESIDE`; the quantities of `WATCHED`, where the eccentricity ratio is `LOST` if the cage turns too slowly for
+        its angle to measure progress.
 
-        **Arguments:** cosine and sine of the cage's angle; else as they are called.
+        **Arguments:** cosine and sine of the cage's angle; largest pocket force and slip; else as they are called.
         """
+        land, (normal, slip) = self.on_land(cage), largest
         model, inner_guided = self.model, self.model.guidance == "inner"
         mass, e, g, damping = model.cage_mass, model.eccentricity, model.gravity, model.ring.mounting_damping
         cos, sin = phase
@@ -307,7 +305,9 @@ class BearingAtSpeed(AbstractField):
         mounting = damping * (cage.ring_vx * cage.ring_vx + cage.ring_vy * cage.ring_vy)
         paid = -on_inner * self.speed - on_outer * model.outer_speed + hold * cage.cage_speed
         about_origin = moment + cage.x * contact_y - cage.y * contact_x - mass * g * (cage.x + e * cos) + hold
-        integrals = (
+        beside = (
+            cage.cage_speed,
+            1.0,
             paid,
             sums.traction,
             sums.raceway_damping,
@@ -333,5 +333,8 @@ class BearingAtSpeed(AbstractField):
             -sums.y * sin,
             land.eps * land.eps,
         )
+        stalled = jnp.abs(cage.cage_speed) < STALLED * jnp.abs(self.rolling_cage_speed)
+        watched = jnp.where(stalled, LOST, land.eps), normal, land.size, slip, land.eps
         rates = cage.vx, cage.vy, cage_x, cage_y, turning, *ring_rates
-        return tuple(map(jnp.asarray, rates)), tuple(map(jnp.asarray, integrals))
+        arrays = lambda numbers: tuple(jnp.asarray(x, dtype=float) for x in numbers)
+        return arrays(rates), arrays(beside), arrays(watched)

@@ -237,20 +237,17 @@ def bearing_field(form: Form, wide: tuple[bool, ...], dimension: int, tangents: 
         `moved` holds cosine and sine of the cage's angle, the numbers of the bodies and the sums over all rollers that
         move them, the tangents of both, the other sums, and the largest pocket force and slip.
         """
-        (cos, sin), numbers, (normal, slip) = moved[:2], moved[2:-2], moved[-2:]
+        (cos, sin), numbers, largest = moved[:2], moved[2:-2], moved[-2:]
         at, _, scale = form.filled(fixed)
         units, size = scale[OF_ROLLER:], OF_BODIES + MOVING
         rest = numbers[size * (1 + tangents) :]
 
         def go(y: Any) -> tuple[Any, Any]:
             cage = Bodies(*(a * u for a, u in zip(y, units, strict=False)))
-            land = at.on_land(cage)
-            rates, integrals = at.body_rates(cage, (cos, sin), Passed(*y[OF_BODIES:], *rest), land)
-            pace = at.pace(cage.cage_speed)
+            sums, pace = Passed(*y[OF_BODIES:], *rest), at.pace(cage.cage_speed)
+            rates, beside, watched = at.body_rates(cage, (cos, sin), sums, largest)
             rates = [pace * x / u for x, u in zip(rates, units, strict=True)]
-            beside = [pace * x for x in (cage.cage_speed, 1.0, *integrals)]
-            lost = at.lost(cage.cage_speed, land.eps)
-            return _floats(rates), _floats((*beside, lost, normal, land.size, slip, land.eps))
+            return _floats(rates), (*(pace * x for x in beside), *watched)
 
         return _with_tangents(go, numbers, size, tangents)
 
