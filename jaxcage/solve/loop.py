@@ -32,7 +32,7 @@ def march_ir(field: Field, pair: str, width: int) -> str:
     made = [_prelude(field, rows, width)] if field.prelude else []
     rates = field.rates.code(field, rows, width) if hasattr(field.rates, "code") else _rates(field, rows, width)
     implicit = [_implicit(field, rows, width)] if tableau.implicit else []
-    return module(*made, rates, *implicit, _refill(rows, width), _loop(field, rows, tableau, width))
+    return module(*made, rates, *implicit, _loop(field, rows, tableau, width), _refill(rows, width))
 
 
 def _made_wide(field: Field) -> list[bool]:
