@@ -181,7 +181,9 @@ def test_gradients_of_requirements(name, where, quantity, step, tolerance):
     """Against differences of fourth order, to 1e-5, and 1e-3 where the land is touched."""
     range_ = range_of(where)
     place = range_.space.place
-    found = range_.margins(place) | range_.worst(place, ("multiplier", "film", "land force", "drag"))
+    margins, worst = range_.margins(place), range_.worst(place, ("multiplier", "film", "land force", "drag"))
+    assert not isinstance(margins, str) and not isinstance(worst, str)
+    found = margins | worst
     f, now = independent(range_, quantity, found[quantity]), float(jc.parameters(CASE)[name])
     at = [f(jc.replace(CASE, **{name: now * (1 + i * step)})) for i in (-2, -1, 0, 1, 2)]
     assert at[2] == pytest.approx(found[quantity].value, rel=0.02 * tolerance**0.5, abs=1e-4 * ("margin" in quantity))

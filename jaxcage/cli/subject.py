@@ -214,7 +214,7 @@ def read_case(given: str) -> Subject:
     """
     about = described(given)
     if about.base == given.lower():
-        found = Subject(about.base, (file := jc.files.built(about)).model, file)
+        found = Subject(given.lower(), (file := jc.files.built(about)).model, file)
     else:
         name = "".join(c if c.isprintable() and c != "$" else "_" for c in Path(given).stem[:LONGEST])
         found = Subject(name, (file := jc.files.read_bearing(given)).model, file, given)

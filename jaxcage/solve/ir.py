@@ -383,7 +383,7 @@ class Code:
         name, before, head, after = f"%n{self.names}", self.block, f"loop{self.names}", f"done{self.names}"
         values = [v._replace(text=f"{name}_{k}") for k, v in enumerate(begin)]
         outer, self.lines, self.block = self.lines, [], head
-        new = list(body(Value(name, "i64"), values) or ())
+        new: list[Value] = list(body(Value(name, "i64"), values) or ())
         latch, lines, self.lines = self.block, self.lines, outer
         self.line(f"br label %{head}")
         self.line(f"{head}:")

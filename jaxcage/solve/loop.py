@@ -94,7 +94,8 @@ def _refill(rows: Layout, width: int) -> Function:
             lane = w.convert("fptosi", w.load(place), "i64")
             keep = lambda row, _: w.store(w.load(mine(row)), of_lane("%stored", row, lane))
             w.when(w.compare("ge", lane, number(0)), lambda: w.loop(number(rows["mark"].stop), [], keep))
-            w.store(*w.when(_goes_on(w), enter, otherwise=[number(-1.0)]), place)
+            (begun,) = w.when(_goes_on(w), enter, otherwise=[number(-1.0)])
+            w.store(begun, place)
 
         def enter() -> list[Value]:
             lane = w.add_atomically(w.element("%queue", 0, "i64"), number(1))
