@@ -1,5 +1,6 @@
 """The catalogue of bearings against ISO 76, geometry and the paper."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -53,6 +54,15 @@ def test_makers_rules_beside_a_computed_slip():
     assert len(notes(1000.0, 0.5)) == len(notes(2000.0, 0.01)) == len(notes(4450.0, 0.01)) == 1
     assert "slip of the cage is 1.00%, although the load is below all" in notes(1000.0, 0.01)[1]
     assert "slip of the cage is 5.00%, although the load is above all" in notes(4450.0, 0.05)[1]
+
+
+def test_the_rating_says_what_it_takes_for_the_length_that_carries():
+    """C0 by ISO 76 of a bearing that is not in the catalogue, 44 (1 - 16/81) 13 25.5 16 = 187 kN, over 60."""
+    wider = dataclasses.replace(nu2310(), width=41e-3)
+    given = dataclasses.replace(wider, effective_length=25.5e-3)
+    notes = [minimum_load_notes(each, 4450.0, 6700.0)[0] for each in (wider, given)]
+    assert all("3.1 kN (C0/60, with C0 by ISO 76" in note for note in notes)
+    assert ["1.5 mm below the roller's" in note for note in notes] == [True, False]
 
 
 def test_a_speed_beyond_the_makers_limit_is_named():

@@ -106,7 +106,7 @@ def test_estimated_values_are_printed(capsys: pytest.CaptureFixture[str], tmp_pa
     assert main(["statics", str(path), "--out", str(tmp_path)]) == 0
     out, err = capsys.readouterr()
     assert out.count("displacement of the cage") == 1  # for the guide that the file has, and no other
-    clearances = "bearing.radial_clearance = 67.5 µm, bearing.pocket_clearance = 0.4125 mm"  # 67.5: ISO 5753-1
+    clearances = "bearing.radial_clearance = 67.5 µm, bearing.pocket_clearance = 0.412 mm"  # 67.5: ISO 5753-1
     assert f"{clearances}, bearing.effective_length = 22.5 mm" in out
     assert "T is estimated: give pocket_clearance below [bearing]" in err
 

@@ -181,6 +181,12 @@ def test_refused(table: dict, said: str):
         model_from(table if not table or "model" in table else {"base": "1a", **table})
 
 
+def test_an_outer_ring_without_ribs_is_given_by_its_raceway():
+    """A bearing of type N, whose cage runs on the inner ring: 65 mm + 2 x 16 mm."""
+    inner = {"guidance": "inner", "inner_land_diameter": "69 mm", "bearing": {"rib_diameter": "97 mm"}}
+    assert float(model_from({"base": "nu2310", **inner}).land_radius) == pytest.approx(34.725e-3)
+
+
 def test_example_in_the_documentation_is_valid(tmp_path: Path):
     shown = inspect.getdoc(inspect.getmodule(load_model))
     assert shown is not None

@@ -12,8 +12,17 @@ import pytest
 
 import jaxcage as jc
 from jaxcage.bearing import PUBLISHED_CASES, catalogue, line_contact_stiffness, listed
-from jaxcage.cli.subject import read_case
-from jaxcage.files import ConfigError, configuration, declarations, load_model, model_from, read_bearing, template
+from jaxcage.cli.subject import check_speeds, described, read_case
+from jaxcage.files import (
+    ConfigError,
+    SpeedOf,
+    configuration,
+    declarations,
+    load_model,
+    model_from,
+    read_bearing,
+    template,
+)
 from jaxcage.files.schema import schema
 
 
@@ -107,6 +116,14 @@ def test_a_long_name_of_a_file_leaves_room_for_names_of_output_files(tmp_path: P
     assert read_case(str(path)).name == "n" * 50
 
 
+def test_ends_of_a_range_are_compared_as_speeds_of_one_ring():
+    """15000 rpm of the shaft are 6018 rpm of the cage of case 1a: 65/162 of it."""
+    shaft, cage = SpeedOf(15000.0, "shaft"), SpeedOf(6100.0, "cage")
+    check_speeds(described("1a"), {"first": shaft, "last": cage})
+    with pytest.raises(ValueError, match="range is 15000 to 6100 rpm of the cage"):
+        check_speeds(described("1a"), {"first": 15000.0, "last": cage})
+
+
 def test_eccentricity_by_a_balance_grade():
     """e = G/omega: 6.3 mm/s at 12000 rpm are 5.013 um; the cage of an NU 1014 turns at 80/180 of the shaft's speed."""
     read = lambda text, **more: model_from(
@@ -142,6 +159,8 @@ def test_what_is_estimated_of_a_catalogue_bearing_is_named(tmp_path: Path):
     found = {row["name"].removeprefix("bearing."): row["from"] for row in rows if row["name"].startswith("bearing.")}
     assert {name for name, source in found.items() if source == "estimated from dimensions"} == {*names}
     assert (found["bore"], found["pocket_clearance"]) == ("catalogue, NU1020", "this file")
+    values = {row["name"]: row["value"] for row in rows}
+    assert (values["bearing.radial_clearance"], values["cage_mass"]) == ("67.5", "0.252088")  # the mass is that of 1a
     path.write_text('base = "1a"\n[bearing]\ndesignation = "NU2310"')
     assert read_bearing(path).estimated == ()
 

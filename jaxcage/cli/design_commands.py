@@ -146,7 +146,8 @@ def _calm_design(
     document = {"optimum": best.values, "vary": bounds} | {name: getattr(best, name) for name in names}
     document["operating_rpm"] = ends = low * RPM, high * RPM
     said = _calm_sentence(best, subject.over(low, high), calm.objective)
-    return Answer(said, tables, notes, document, {"figure": jc.show.calm_figure(best, ends, name)})
+    failure = "" if best.feasible else "No design was found that keeps all requirements."
+    return Answer(said, tables, notes, document, {"figure": jc.show.calm_figure(best, ends, name)}, failure=failure)
 
 
 def _broken_rule(given: Any, found: Any) -> list[str]:

@@ -192,8 +192,9 @@ def described(given: str) -> "Description":
 def check_speeds(found: "Description", speeds: dict[str, float | None]) -> None:
     """Check the speeds that options give, by option, without loading JAX. **Raises:** `InputError`."""
     first, last = speeds.get("first"), speeds.get("last")
-    if first and last and last <= first and type(first) is type(last):
-        between = f"{first:g} to {last:g} rpm of the {getattr(first, 'whose', found.speeds)}"
+    owners = {getattr(end, "whose", found.speeds) for end in (first, last)}
+    if first and last and last <= first and len(owners) == 1:
+        between = f"{first:g} to {last:g} rpm of the {owners.pop()}"
         raise InputError(f"Option --last must be above --first, but the range is {between}.")
     n = found.numbers
     if n.get("guidance") == "inner" or "outer_speed" in n:  # `Subject.rpm` knows them

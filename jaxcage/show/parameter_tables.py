@@ -48,7 +48,7 @@ def sources_table(model: AbstractForcedSystem, file: BearingFile | None) -> Tabl
             if given is None and (info.source == SOURCES["fixed"] or not float(value)):
                 continue
             unit, number = shown(float(value), info.unit)
-            text, value = info.text, f"{number:.6g}"
+            text, value = info.text, estimate(number) if file and name in file.estimated else f"{number:.6g}"
             if (known := ranges.get(short[path])) is not None:
                 between = " to ".join(f"{shown(end, info.unit, unit)[1]:.4g}" for end in (known.lower, known.upper))
         if {name, name.removesuffix("_x").removesuffix("_y")} & set(left):
@@ -75,6 +75,11 @@ def shown(value: float, unit: str, like: str = "") -> tuple[str, float]:
     if name == "GPa" and abs(value) < 1e7:
         return unit, value
     return name, value * times + offset
+
+
+def estimate(value: float) -> str:
+    """An estimated value with three digits."""
+    return f"{float(f'{value:.3g}'):.4g}"
 
 
 def _published(model: AbstractForcedSystem, path: tuple[str, ...], field: dataclasses.Field) -> str:
@@ -123,7 +128,7 @@ def values_words(model: AbstractForcedSystem, names: Sequence[str]) -> list[str]
     for name in names:
         value, info = fields[name]
         unit, number = ("", value) if info is None else shown(float(value), info.unit)
-        words.append(f"{name} = {number:.4g} {unit}".rstrip())
+        words.append(f"{name} = {estimate(number)} {unit}".rstrip())
     return words
 
 

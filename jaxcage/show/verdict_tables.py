@@ -209,7 +209,8 @@ def limiting_speed_notes(bearing: Any, shaft_rpm: float) -> list[str]:
 def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float, slip: float | None = None) -> list[str]:
     """Notes that compare the load of a bearing [N] with the makers' rules, and these with a computed slip."""
     like, rating = listed_like(bearing), static_load_rating(bearing)
-    rules = [("C0/60, with C0 by ISO 76", rating / 60)]
+    length = " and an effective length 1.5 mm below the roller's" if bearing.effective_length is None else ""
+    rules = [(f"C0/60, with C0 by ISO 76{length}", rating / 60)]
     if like is not None:
         rules = [(f"C0/60 of {like.designation}", (like.static_rating or rating) / 60)]
         usual, brass = like.minimum_loads(shaft_rpm)
