@@ -63,6 +63,8 @@ def test_the_rating_says_what_it_takes_for_the_length_that_carries():
     notes = [minimum_load_notes(each, 4450.0, 6700.0)[0] for each in (wider, given)]
     assert all("3.1 kN (C0/60, with C0 by ISO 76" in note for note in notes)
     assert ["1.5 mm below the roller's" in note for note in notes] == [True, False]
+    assert minimum_load_notes(wider, 188e3, 6700.0)[1] == "The load is above C0 = 187 kN: look at its unit"
+    assert len(minimum_load_notes(wider, 187e3, 6700.0)) == 1
 
 
 def test_a_speed_beyond_the_makers_limit_is_named():

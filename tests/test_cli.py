@@ -70,6 +70,7 @@ REFUSED = [
     ("design 1a --price cost=5 --operating 9000-9500", "--price and --steps go with a search on simulations"),
     ("design 1a --search surrogate --operating 9000-9500", "--search surrogate goes without --operating"),
     ("design 1a --operating 9000-9500 --least-film thin", "--least-film must be a number in m, or one with a unit"),
+    ("design 1a --operating 9000-9500 --tolerance guidance_gap=+-0.02", "must fit between 1e-05 and 0.005 m"),
     ("design 1a --vary load=1:2 --vary load=1:3", "load was given twice"),
     ("design 1a --vary eccentricity=30um:60um", "--vary must let the eccentricity become smaller"),
     ("sensitivity 1a --samples 3", "--samples must be a power of 2"),

@@ -97,7 +97,9 @@ def read_tolerances(text: str, subject: Subject, fastest: float) -> dict[str, An
             return jc.Tolerance.balanced(float(grade[1]), fastest)
         if not words.startswith("±"):
             raise ValueError(f"must be ±X with a unit or, for the eccentricity, a grade such as G6.3, but is {words}.")
-        half = jc.files.to_si(words[1:].strip(), info[name].unit)
+        half, (lower, upper) = jc.files.to_si(words[1:].strip(), info[name].unit), (info[name].lower, info[name].upper)
+        if half > upper - lower:
+            raise ValueError(f"must fit between {lower:g} and {upper:g} {info[name].unit}, but is ±{half:g}.")
         return jc.Tolerance(-half, half)
 
     parts = [part.strip() for part in text.split(",") if part.strip()]

@@ -222,6 +222,8 @@ def minimum_load_notes(bearing: Any, load: float, shaft_rpm: float, slip: float 
     side = f"above {them}" if not below else f"below {them}" if len(below) == len(rules) else ""
     verdict = f"the load of {load / 1e3:.3g} kN is {side or 'below ' + ' and '.join(below)}"
     notes = [f"Minimum load against skidding at {shaft_rpm:.0f} rpm of the shaft: {said}; {verdict}"]
+    if load > 60 * rules[0][1]:
+        notes.append(f"The load is above C0 = {0.06 * rules[0][1]:.3g} kN: look at its unit")
     if slip is None:
         return notes
     given, skids = f"the computed slip of the cage is {slip:.2%}", slip >= SKIDS
