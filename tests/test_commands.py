@@ -99,6 +99,13 @@ def test_a_speed_may_be_the_shafts_or_the_cages(capsys: pytest.CaptureFixture[st
     assert run(str(path), "--speed", "20000")["speed_rpm"] == pytest.approx(20000 * RATIO)
 
 
+def test_an_answer_begins_with_the_speed_that_the_file_means(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    (path := tmp_path / "mine.toml").write_text('base = "1a"\nspeeds = "shaft"')
+    asked = ["--speed", "20000", "--revolutions", "1", "--discard", "0", *RK4, "--out", str(tmp_path)]
+    assert main(["simulate", str(path), *asked]) == 0
+    assert capsys.readouterr().out.startswith("At 20000 rpm of the shaft (cage 8025 rpm): largest eccentricity ratio")
+
+
 def test_estimated_values_are_printed(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     """A gap of 0.5 mm is wider than the pocket clearance that is estimated for an NU 220, as the warning says."""
     path = tmp_path / "mine.toml"

@@ -98,8 +98,11 @@ class Subject:
 
     def at(self, speed: float) -> str:
         """A speed of the model [rad/s] in words."""
-        other, rolling = ("shaft", "") if self.own == "cage" else ("cage", " in pure rolling")
-        return f"{speed * RPM:g} rpm of the {self.own} ({other} {float(self._other(speed * RPM)):.0f} rpm{rolling})"
+        own, other = speed * RPM, float(self._other(speed * RPM))
+        if self.own == "shaft":
+            return f"{own:g} rpm of the shaft (cage {other:.0f} rpm in pure rolling)"
+        shaft_first = f"{other:g} rpm of the shaft (cage {own:.0f} rpm)"
+        return shaft_first if self.beside else f"{own:g} rpm of the cage (shaft {other:.0f} rpm)"
 
     def rate(self, given: float) -> float:
         """Rate of the model's speed [rad/s^2] from one [rpm/s] of the speed that bare numbers are."""

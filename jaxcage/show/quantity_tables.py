@@ -54,11 +54,12 @@ def quantity_words(found: Measured) -> str:
     """A quantity in a sentence, with its error: `friction power 1187.0 ± 1.2 W` or `cage slip 2.11 ± 0.12 %`."""
     quantity, value, error = found
     times, unit = in_per_cent(quantity.name, quantity.unit)
-    return f"{head_of(quantity.name, quantity.unit)} {number(times * value, times * error)} {unit}".removesuffix(" 1")
+    head = HEADS.get(quantity.name, head_of(quantity.name, quantity.unit))
+    return f"{head} {number(times * value, times * error)} {unit}".removesuffix(" 1")
 
 
-HEADS = {"size": "orbit size", "eccentricity": "largest eccentricity ratio"}
-"""Column headers of variables of a ramp, whose names alone are ambiguous."""
+HEADS = dict.fromkeys(("eccentricity", "largest_eps"), "largest eccentricity ratio") | {"size": "orbit size"}
+"""Headers of variables whose names alone are ambiguous."""
 
 
 def column_of(found: xr.Dataset, name: str) -> Column:
