@@ -11,9 +11,11 @@ from pathlib import Path
 
 import pytest
 from helpers import refused
+from matplotlib.figure import Figure
 
 import jaxcage
 from jaxcage.cli import main
+from jaxcage.design import Design
 from jaxcage.files import ConfigError, load_model, read_bytes
 
 
@@ -197,6 +199,7 @@ def test_a_sweep_ends_at_once_that_is_interrupted_twice_or_told_to_end(
 MODULES = """
 import sys
 from jaxcage.cli import main
+from jaxcage.design import Design
 status = main(sys.argv[1:])
 print(status, sorted({"jax", "scipy", "matplotlib"} & set(sys.modules)))
 """
@@ -226,3 +229,15 @@ def test_a_balance_grade_replaces_the_usual_bounds_of_the_eccentricity(
     ):
         assert main(["design", "1a", "--operating", "12600-17600", "--tolerance", given]) == 1
         assert capsys.readouterr().err.splitlines()[-1] == f"varied: {varied}"
+
+
+def test_a_search_without_a_design_ends_with_status_1(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    model, none = jaxcage.case("1a"), dict.fromkeys(("before", "after", "short", "prices", "worst"), {})
+    same: dict = dict(model=model, values={}, cost=2.0, cost_before=2.0, requirements=[], evaluations=1, checked=None)
+    found = Design(**same, **none, feasible=False, conflict=(), at_bound=(), budget=[], notes=(), path=[], lost="none")
+    monkeypatch.setattr(jaxcage, "design_for", lambda *_, **__: found)
+    monkeypatch.setattr(jaxcage.show, "calm_figure", lambda *_: Figure())
+    assert main(["design", "1a", "--operating", "12600-17600", "--out", str(tmp_path)]) == 1
+    assert capsys.readouterr().err.splitlines()[-1] == "No design was found that keeps all requirements."
