@@ -273,5 +273,6 @@ def identify(
     each = zip(found.unknowns, found.ranges, found.narrowed, strict=True)
     new = {u.label: (r, units[u.label]) for u, r, worth in each if worth}
     text = jc.files.with_ranges(jc.files.read_bytes(subject.path).decode(), new)
-    said = f"{found.accepted} of {found.draws} draws of the last of {found.stages} stages do what was measured."
+    said = f"{found.accepted} of {found.draws} draws of the last of {found.stages} stages do what was measured"
+    said = f"{len(new) or 'None'} of {len(units)} ranges became narrower: {said}."
     return Answer(said, [jc.show.narrowed_table(found, units), table], [], document, {"file": text}, by_ranges=True)
