@@ -54,8 +54,6 @@ class DesignSpace(eqx.Module):
                 raise InputError(f"`{name}` must be {parameters_like(name, [*known])}.")
             if not (np.isfinite([low, high]).all() and low < high):
                 raise InputError(f"Bounds of `{name}` must ascend, but {low} and {high} were given.")
-        for ends in zip(*vary.values(), strict=True):  # outside their ranges the parameters raise
-            replace(system, **dict(zip(vary, ends, strict=True)))
         low, high = np.array(list(vary.values()), dtype=float).T
         return cls(system, low, high - low, tuple(vary))
 

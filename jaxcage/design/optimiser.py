@@ -20,7 +20,7 @@ from scipy.optimize import minimize, nnls
 from .._allowed import allowed
 from .._arguments import require_at_least, require_x64
 from .._errors import ArgumentError
-from .._parameters import parameter_info
+from .._parameters import parameter_info, replace
 from ..lanes import sobol
 from ..models import AbstractForcedSystem
 from .design_space import DesignSpace, Value, function_value
@@ -260,6 +260,8 @@ def design_for(
         raise ArgumentError("operating", said=f"must be two positive speeds, ascending, but are {low:g} and {high:g}.")
     tolerance = dict(tolerance or {})
     space = DesignSpace.of(model, widened(model, vary, tolerance))
+    for ends in zip(*vary.values(), strict=True):  # outside their ranges the parameters raise
+        replace(model, **dict(zip(vary, ends, strict=True)))
     free = np.array([name in vary for name in space.names])
     say = progress or (lambda what, done, of: None)
     say("edges of the given design", 0, 1)
