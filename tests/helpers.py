@@ -85,6 +85,13 @@ def elastic(model: jc.CageModel, mass: float = 1.0, stiffness: float = 5e7, damp
     )
 
 
+def unforced(model: jc.CageModel) -> jc.CageModel:
+    """Film, contact and weight only: no support, no impact, no unbalance."""
+    zero = "stiffness_x stiffness_y support.damping cubic_stiffness cross_stiffness amplitude eccentricity".split()
+    names = jc.parameters(model)
+    return jc.replace(model, **{n if n in names else n.split(".")[-1]: jnp.zeros(()) for n in zero})
+
+
 def roller_pass(model: jc.CageModel) -> jc.CageModel:
     """The model with impacts roller by roller."""
     return jc.replace(model, impact=jc.forces.RollerPassImpact(jc.forces.PocketImpact()))

@@ -199,7 +199,6 @@ def test_a_sweep_ends_at_once_that_is_interrupted_twice_or_told_to_end(
 MODULES = """
 import sys
 from jaxcage.cli import main
-from jaxcage.design import Design
 status = main(sys.argv[1:])
 print(status, sorted({"jax", "scipy", "matplotlib"} & set(sys.modules)))
 """

@@ -65,7 +65,8 @@ def simulate(
         columns = jc.show.trajectory_columns(found, jc.analysis.cage_forces(model, found))
     else:
         shares = jc.analysis.pocket_force_distribution(rollers.history)
-        document |= {"around": rollers.around, "orders": rollers.orders, "force_shares": shares}
+        around = {name: x.values for name, x in rollers.around.variables.items()}
+        document |= {"around": around, "orders": rollers.orders, "force_shares": shares}
         columns = jc.show.roller_columns(rollers.history)
         shaft, slip = float(document["shaft_speed_rpm"]), measures.value("cage_slip")
         notes += [*jc.show.minimum_load_notes(model.bearing, float(model.load), shaft, slip), *_wear_notes(subject)]
