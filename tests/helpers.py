@@ -18,7 +18,6 @@ import xarray as xr
 import jaxcage as jc
 from jaxcage.analysis import label_lanes, scatter
 from jaxcage.cli import main
-from jaxcage.forces import parameter
 from jaxcage.quantities import component_names
 from jaxcage.solve import OUTCOMES
 
@@ -107,29 +106,6 @@ class EvenSteps(jc.CageModel):
 def even(model: jc.CageModel) -> jc.CageModel:
     """The model by steps of one length."""
     return EvenSteps(**{field.name: getattr(model, field.name) for field in dataclasses.fields(model)})
-
-
-class DoubleWell(eqx.Module):
-    """m x'' + d x' - k x + b x^3 = g cos(w t), whose small orbit ends in a fold and in a period doubling."""
-
-    mass: float = parameter("kg", 0.0, 1e3, "m")
-    damping: float = parameter("N s/m", 0.0, 1e3, "d")
-    stiffness: float = parameter("N/m", -1e3, 1e3, "k")
-    cubic: float = parameter("N/m^3", 0.0, 1e3, "b")
-    forcing: float = parameter("N", 0.0, 1e3, "g")
-
-    def __call__(self, tau, q, v, speed):
-        (x,), (u,) = q, v
-        push = self.forcing * jnp.cos(tau)
-        return ((push - self.damping * u + self.stiffness * x - self.cubic * x**3) / self.mass,)
-
-
-WELL = {"mass": 1.0, "damping": 0.3, "stiffness": 1.0, "cubic": 1.0}
-
-
-def double_well() -> jc.ForcedOscillator:
-    """The oscillator with `WELL` and a forcing of 0.262 N."""
-    return jc.ForcedOscillator(DoubleWell(**WELL, forcing=0.262), coordinates=1)
 
 
 def wide_but(values: Iterable[Any], *quick: Any) -> list[Any]:

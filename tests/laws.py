@@ -1,10 +1,10 @@
 """Oscillators that several tests of orbits share, as a user would write them."""
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 
 import jaxcage as jc
+from jaxcage.forces import parameter
 
 
 def numbers(**values):
@@ -14,11 +14,11 @@ def numbers(**values):
 class Duffing(eqx.Module):
     """m x'' + d x' - k x + b x^3 = g cos(w t): double-well for k > 0, hardening for k < 0."""
 
-    m: jax.Array
-    d: jax.Array
-    k: jax.Array
-    b: jax.Array
-    g: jax.Array
+    m: float = parameter("kg", -1e3, 1e3, "m")
+    d: float = parameter("N s/m", -1e3, 1e3, "d")
+    k: float = parameter("N/m", -1e3, 1e3, "k")
+    b: float = parameter("N/m^3", -1e3, 1e3, "b")
+    g: float = parameter("N", -1e3, 1e3, "g")
 
     def __call__(self, tau, q, v, speed):
         (x,), (u,) = q, v

@@ -5,7 +5,7 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import WELL, DoubleWell, double_well
+from laws import double_well, hardening
 from literature import DUFFING_FOLDS
 
 import jaxcage as jc
@@ -15,7 +15,7 @@ from jaxcage.design.optimiser import Problem
 from jaxcage.design.requirements import listed
 
 
-VARY = {"damping": (0.1, 1.0), "cubic": (0.5, 3.0)}
+VARY = {"d": (0.1, 1.0), "b": (0.5, 3.0)}
 
 
 def by_parameters(height):
@@ -23,68 +23,68 @@ def by_parameters(height):
     return lambda models: np.array([float(height(jc.parameters(model))) for model in models])
 
 
-def bowl(damping=0.4, cubic=1.5):
-    """Smallest, with the value 1, where damping and cubic are these."""
-    return by_parameters(lambda p: 1.0 + 40 * (p["damping"] - damping) ** 2 + (p["cubic"] - cubic) ** 2)
+def bowl(d=0.4, b=1.5):
+    """Smallest, with the value 1, where d and b are these."""
+    return by_parameters(lambda p: 1.0 + 40 * (p["d"] - d) ** 2 + (p["b"] - b) ** 2)
 
 
-@pytest.mark.parametrize("vary", [VARY, {"cubic": VARY["cubic"]}])
+@pytest.mark.parametrize("vary", [VARY, {"b": VARY["b"]}])
 def test_a_search_finds_a_known_optimum(vary: dict[str, tuple[float, float]]):
-    found = jc.design.surrogate_search(double_well(), vary, bowl(damping=WELL["damping"]))
+    found = jc.design.surrogate_search(double_well(0.262), vary, bowl(d=0.3))
     assert found.objective == pytest.approx(1.0, abs=2e-3) and found.at_bound == () and found.changed
-    assert found.values == pytest.approx({n: {"damping": WELL["damping"], "cubic": 1.5}[n] for n in vary}, rel=0.05)
-    assert found.model.acceleration.cubic == pytest.approx(found.values["cubic"])  # pyright: ignore
+    assert found.values == pytest.approx({n: {"d": 0.3, "b": 1.5}[n] for n in vary}, rel=0.05)
+    assert found.model.acceleration.b == pytest.approx(found.values["b"])  # pyright: ignore
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_search_among_many_valleys_beats_as_many_even_draws(seed: int):
     """Rastrigin's function of four parameters; the draws are those of the same Sobol sequence."""
-    names = ("damping", "cubic", "stiffness", "forcing")
+    names = ("d", "b", "k", "g")
     vary = {n: (0.2, 2.2) for n in names}
     waves = lambda x: 10.0 + x**2 - 10 * jnp.cos(2 * jnp.pi * x)
     height = by_parameters(lambda p: 1.0 + sum(waves(p[n] - 1.4) for n in names))
-    found = jc.design.surrogate_search(double_well(), vary, height, batches=10, batch=12, seed=seed)
+    found = jc.design.surrogate_search(double_well(0.262), vary, height, batches=10, batch=12, seed=seed)
     drawn = jc.lanes.sobol(4, 120, seed) * 2.0 + 0.2
-    even = height([jc.replace(double_well(), **dict(zip(names, row, strict=True))) for row in drawn.tolist()])
+    even = height([jc.replace(double_well(0.262), **dict(zip(names, row, strict=True))) for row in drawn.tolist()])
     assert found.objective < even.min()
 
 
 def test_designs_without_a_value_are_passed_over():
     inside = bowl()
-    holes = lambda models: np.where([float(jc.parameters(m)["cubic"]) < 1.2 for m in models], np.nan, inside(models))
-    found = jc.design.surrogate_search(double_well(), VARY, holes, batches=6)
-    assert found.values["cubic"] >= 1.2 and found.objective < 1.05
+    holes = lambda models: np.where([float(jc.parameters(m)["b"]) < 1.2 for m in models], np.nan, inside(models))
+    found = jc.design.surrogate_search(double_well(0.262), VARY, holes, batches=6)
+    assert found.values["b"] >= 1.2 and found.objective < 1.05
 
 
 def test_the_best_of_many_with_noise_is_chosen_anew():
     """Noise of 2 hides a bowl; by the bowl itself the design chosen is better than what the search took for best, and
     one that is the best from the beginning stays."""
-    exact, rng, system = bowl(damping=0.7), np.random.default_rng(0), double_well()
+    exact, rng, system = bowl(d=0.7), np.random.default_rng(0), double_well(0.262)
     noisy = lambda models: exact(models) + 2.0 * rng.normal(size=len(models))
     lucky = jc.design.surrogate_search(system, VARY, noisy, batches=8)
     chosen = jc.design.surrogate_search(system, VARY, noisy, confirm=exact, batches=8)
     assert lucky.objective < 1.0 <= chosen.objective == pytest.approx(exact([chosen.model])[0])
     assert chosen.objective <= exact([system])[0]
-    stays = jc.design.surrogate_search(system, VARY, noisy, confirm=bowl(**{n: WELL[n] for n in VARY}), batches=2)
+    stays = jc.design.surrogate_search(system, VARY, noisy, confirm=bowl(d=0.3, b=1.0), batches=2)
     assert not stays.changed and stays.objective == pytest.approx(1.0) and stays.model is system
 
 
 def test_a_bound_that_stops_the_search_is_named():
-    found = jc.design.surrogate_search(double_well(), VARY, bowl(damping=2.0))
-    assert found.at_bound == ("damping",) and found.values["damping"] <= 1.0 and "at bound" in str(found)
+    found = jc.design.surrogate_search(double_well(0.262), VARY, bowl(d=2.0))
+    assert found.at_bound == ("d",) and found.values["d"] <= 1.0 and "at bound" in str(found)
 
 
 @pytest.mark.wide
 def test_sobol_indices_of_ishigami():
     """Ishigami and Homma's function, a = 7, b = 0.1: first 0.3139, 0.4424, 0, total 0.5576, 0.4424, 0.2437."""
-    names = ("damping", "cubic", "stiffness")
+    names = ("d", "b", "k")
     vary = {n: (0.5, 1.5) for n in names}
 
     def ishigami(p):
         x, y, z = (2 * np.pi * (float(p[n]) - 1.0) for n in names)
         return np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
 
-    got = jc.design.global_sensitivity(double_well(), vary, by_parameters(ishigami), samples=1024)
+    got = jc.design.global_sensitivity(double_well(0.262), vary, by_parameters(ishigami), samples=1024)
     for found, ends, exact in (
         (got.first, got.first_interval, (0.3139, 0.4424, 0.0)),
         (got.total, got.total_interval, (0.5576, 0.4424, 0.2437)),
@@ -96,19 +96,19 @@ def test_sobol_indices_of_ishigami():
 def test_a_parameter_that_changes_nothing_and_scatter_of_the_motion():
     """Two blocks that differ by noise of variance 0.5: their mean has a quarter of it, beside 1/12 of the parameter."""
     rng = np.random.default_rng(0)
-    cubic = by_parameters(lambda p: p["cubic"])
+    cubic = by_parameters(lambda p: p["b"])
     values = lambda models: cubic(models)[:, None] + np.sqrt(0.5) * rng.normal(size=(len(models), 2))
-    vary = {"cubic": (0.5, 1.5), "damping": (0.1, 0.5)}
-    got = jc.design.global_sensitivity(double_well(), vary, values, samples=256)
-    assert got.scatter == pytest.approx(0.75, abs=0.1) and got.first["cubic"] == pytest.approx(0.25, abs=0.15)
-    still = jc.design.global_sensitivity(double_well(), vary, cubic, samples=8)
-    assert still.total["damping"] == 0.0 == still.first["damping"] and still.total_interval["damping"] == (0.0, 0.0)
+    vary = {"b": (0.5, 1.5), "d": (0.1, 0.5)}
+    got = jc.design.global_sensitivity(double_well(0.262), vary, values, samples=256)
+    assert got.scatter == pytest.approx(0.75, abs=0.1) and got.first["b"] == pytest.approx(0.25, abs=0.15)
+    still = jc.design.global_sensitivity(double_well(0.262), vary, cubic, samples=8)
+    assert still.total["d"] == 0.0 == still.first["d"] and still.total_interval["d"] == (0.0, 0.0)
 
 
 def test_sobol_indices_and_their_intervals_of_a_value_far_from_zero():
-    vary = {"cubic": (0.5, 1.5), "damping": (0.5, 1.5)}
+    vary = {"b": (0.5, 1.5), "d": (0.5, 1.5)}
     plain, shifted = (
-        jc.design.global_sensitivity(double_well(), vary, by_parameters(lambda p: a + p["cubic"] + p["damping"] / 2))
+        jc.design.global_sensitivity(double_well(0.262), vary, by_parameters(lambda p: a + p["b"] + p["d"] / 2))
         for a in (-1.5, 98.5)
     )
     assert shifted.first == pytest.approx(plain.first)
@@ -167,14 +167,14 @@ def test_tolerance_budget_is_the_root_of_squares():
 @pytest.mark.parametrize(
     "vary, options, words",
     [
-        ({"damping": (0.5, 1.0)}, {}, "must lie within the bounds, but damping does not"),
+        ({"d": (0.5, 1.0)}, {}, "must lie within the bounds, but d does not"),
         (VARY, {"batches": 0}, "at least 1"),
         (VARY, {"batch": 1}, "at least 2"),
     ],
 )
 def test_bad_input_gets_a_sentence(vary, options, words):
     with pytest.raises(ValueError, match=words):
-        jc.design.surrogate_search(double_well(), vary, bowl(), **options)
+        jc.design.surrogate_search(double_well(0.262), vary, bowl(), **options)
 
 
 @pytest.mark.wide
@@ -227,7 +227,7 @@ def test_loads_of_the_land_are_those_of_a_time_history():
 def test_speeds_without_an_orbit_are_not_the_worst():
     """Also for the film, whose value for comparison is negative."""
 
-    known = jc.periodic_orbit(double_well(), 1.2, method=jc.method("rk4", steps=64))
+    known = jc.periodic_orbit(double_well(0.262), 1.2, method=jc.method("rk4", steps=64))
 
     class Known:
         def orbit(self, speed):
@@ -241,8 +241,8 @@ def test_speeds_without_an_orbit_are_not_the_worst():
 
 @pytest.mark.wide
 def test_orbits_past_a_fold_are_none_of_the_operating_range():
-    system = jc.ForcedOscillator(DoubleWell(1.0, 0.1, -1.0, 1.0, 0.3), coordinates=1)
-    space = jc.design.DesignSpace.of(system, {"damping": (0.05, 0.2)})
+    system = hardening()
+    space = jc.design.DesignSpace.of(system, {"d": (0.05, 0.2)})
     range_ = jc.design.OperatingRange(space, (1.1, 1.7), margin=10.0)
     edges = range_.edges(space.place)
     assert not isinstance(edges, str) and edges["upper"] is not None and not range_.handed_over
