@@ -50,7 +50,7 @@ def require_range(name: str, value: Any, info: ParameterInfo) -> None:
 
 
 def _wrong(x: Any, info: ParameterInfo) -> str:
-    """Words about a value that a parameter must not have; empty for others, and for placeholders."""
+    """Message about a value that a parameter does not allow; empty if it does, and for placeholders."""
     if isinstance(x, _NO_NUMBERS) or (isinstance(x, np.ndarray | np.generic) and x.dtype.kind not in "iuf"):
         return f"{allowed(info)}, but {shown(x)} was given."
     if isinstance(x, Tracer) or not isinstance(x, int | float | np.ndarray | np.generic | jax.Array):

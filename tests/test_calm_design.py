@@ -148,7 +148,7 @@ def range_of(rpm):
 
 
 CALM, TOUCHED = (12500.0, 18000.0), (20397.5, 20602.5)
-"""In the second range the land is touched."""
+"""The land is touched in the second range."""
 
 
 def independent(range_, quantity, value):

@@ -242,7 +242,7 @@ def zones(sweep: xr.Dataset, close_below_rpm: float | None = None) -> Zones:
 
 
 def _ascending(sweep: xr.Dataset) -> xr.Dataset:
-    """The sweep with its speeds in ascending order, in which parts that were joined need not be."""
+    """Sort a sweep by speed, since joined parts may come in any order."""
     if sweep["label"].dims != ("speed", "initial_state"):
         raise ArgumentError("sweep", said=f"must be over speed and initial state, but is over {sweep['label'].dims}.")
     return sweep.sortby("speed")

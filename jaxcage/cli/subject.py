@@ -55,7 +55,7 @@ class Subject:
 
     @property
     def published(self) -> "PublishedCase | None":
-        """What is published of the case."""
+        """Data of the paper about the case; None for a file."""
         return None if self.path else jc.bearing.PUBLISHED_CASES.get(self.name)
 
     @property

@@ -260,8 +260,8 @@ def design_for(
         raise ArgumentError("operating", said=f"must be two positive speeds, ascending, but are {low:g} and {high:g}.")
     tolerance = dict(tolerance or {})
     space = DesignSpace.of(model, widened(model, vary, tolerance))
-    for ends in zip(*vary.values(), strict=True):  # outside their ranges the parameters raise
-        replace(model, **dict(zip(vary, ends, strict=True)))
+    for name, end in ((name, end) for name, ends in vary.items() for end in ends):
+        replace(model, **{name: end})  # raises for a bound outside the parameter's range
     free = np.array([name in vary for name in space.names])
     say = progress or (lambda what, done, of: None)
     say("edges of the given design", 0, 1)

@@ -118,8 +118,9 @@ def coordinates_of(model: AbstractForcedSystem, given: Mapping[str, Coordinate])
 def _other_speed(plan: Plan) -> dict[str, Any]:
     """Coordinate with the other speed of a single model (of the shaft or of the cage) in rpm; empty without one."""
     dims, speed = plan.coordinates[SPEED]
-    others = [other for w in speed if (other := plan.model.other_speed(w)) is not None]
-    if dims != (SPEED,) or plan.lanes.several or not others:
+    single = dims == (SPEED,) and not plan.lanes.several
+    others = [other for w in speed if single and (other := plan.model.other_speed(w)) is not None]
+    if not others:
         return {}
     rpm, text = np.array([float(other) for _, other in others]) * 30 / np.pi, others[0][0]
     return {f"{text.split()[0]}_rpm": (dims, rpm, {"long_name": text, "units": "rpm"})}
